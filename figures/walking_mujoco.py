@@ -1,9 +1,7 @@
-"""The engine of three dimensions: its step-size study, and its speeds against those of the planar engine. Needs MuJoCo.
+"""The engine of three dimensions: its errors by steps and elements, and its speeds against the planar engine's. Needs MuJoCo.
 
-Xplorer's progress in a stride of its limit cycle at 2 Hz by implicit steps
-(`rft.terradynamics.walking.multibody`), and by MuJoCo's own, with the grains' forces
-held as they are at the start of each: these are of order 1, and go astray below some
-200 steps a cycle.
+Xplorer's progress in a stride of its limit cycle at 2 Hz, against the time steps of a cycle, of which each is 16 of MuJoCo's,
+and against the elements of a leg. The speeds of the planar engine are those of 96 steps and 48 elements.
 """
 
 from __future__ import annotations
@@ -17,65 +15,42 @@ from geomech import plots
 from geomech.scenes import load
 from rft.terradynamics.walking import Tripod, Walker, engine
 
-STEPS = {
-    "implicit": (12, 16, 24, 32, 48, 64, 96, 128),
-    "held": (128, 256, 512, 1024, 2048, 4096),
-}
-FINEST, FREQUENCY = 768, 2.0
+STUDY = {"steps": (8, 12, 16, 24, 32, 48, 64), "elements": (4, 6, 8, 12, 16, 24)}
+FINEST = {"steps": 256, "elements": 96}
+FINE = {"steps": 96, "elements": 48}  # of the planar engine
+ORDERS = {"steps": 1, "elements": 2}
+FREQUENCY = 2.0
 MOST_STRIDES = 6  # strides, at most, to the limit cycle
-HEAVY = 1e-4  # kg m^2, of a leg about its hip, where its forces are held: without, none of these steps stays finite
 FREQUENCIES = {
     "Xplorer": (1.0, 2.0, 3.0, 4.0),
     "SandBot": tuple(np.array([2.0, 4.0, 6.0, 8.0]) / (2 * np.pi)),
 }
 
 
-def _simulation(steps: int):
-    """Return the walk of Xplorer by so many steps a cycle, not begun yet."""
+def _simulation(**numerics):
+    """Return the walk of Xplorer with other numerics, not begun yet."""
     from rft.terradynamics.walking.mujoco_walk import Simulation
 
     scene = load("xplorer")
     walker = Walker(scene.robot, Tripod(FREQUENCY), scene.medium)
-    return Simulation(walker, dataclasses.replace(scene.numerics, steps=steps))
+    return Simulation(walker, dataclasses.replace(scene.numerics, **numerics))
 
 
-def stride_length(start, steps: int, how: str) -> float:
-    """Return the progress in one stride from a state, m. how: "implicit", or "held" for MuJoCo's own steps."""
-    import mujoco
-
-    body, h = _simulation(steps).body, 1 / (FREQUENCY * steps)
-    model, data = body.model, body.data
-    data.qpos[:], data.qvel[:] = start
-    mujoco.mj_forward(model, data)
-    if how == "held":
-        model.opt.timestep, model.opt.integrator = (
-            h,
-            int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST),
-        )
-        model.dof_armature[6:] = (
-            HEAVY  # of what turns as it is told, and so feels nothing of it
-        )
-    for k in range(steps):
-        if how == "implicit":
-            body.step(h)
-            continue
-        data.qfrc_applied[:] = body._loads(0.0)[0]
-        data.ctrl[:] = body.control((k + 1) * h, (k + 0.5) * h)
-        mujoco.mj_step(model, data)
-        mujoco.mj_forward(model, data)
-        if data.warning[int(mujoco.mjtWarning.mjWARN_BADQACC)].number:
-            return np.inf  # MuJoCo has begun anew
-    return float(data.qpos[0] - start.qpos[0])
+def stride_length(start, **numerics) -> float:
+    """Return the progress in one stride from a state, m."""
+    walk = _simulation(**numerics).walk(1, start=start)
+    return float(walk.pose[-1, 0] - walk.pose[0, 0])
 
 
-def compute(steps=STEPS, finest: int = FINEST, frequencies=FREQUENCIES) -> dict:
-    """Return {"steps": {how: (steps, error of the way over it)}, "speeds": {robot: (frequencies, planar, MuJoCo)}}, Hz, m/s."""
-    start = _simulation(64).walk(MOST_STRIDES).limit
-    truth = stride_length(start, finest, "implicit")
-    study = {
-        how: (n, np.array([abs(stride_length(start, k, how) / truth - 1) for k in n]))
-        for how, n in steps.items()
-    }
+def compute(study=STUDY, finest=FINEST, frequencies=FREQUENCIES, fine=FINE) -> dict:
+    """Return {"errors": {setting: (values, error of the way over it)}, "speeds": {robot: (frequencies, planar, MuJoCo)}}, Hz,
+    m/s."""
+    start = _simulation().walk(MOST_STRIDES).limit
+    errors = {}
+    for name, values in study.items():
+        truth = stride_length(start, **{name: finest[name]})
+        ways = np.array([stride_length(start, **{name: k}) for k in values])
+        errors[name] = values, np.abs(ways / truth - 1)
     speeds = {}
     for name, chosen in frequencies.items():
         scene = load(name.lower())
@@ -85,33 +60,28 @@ def compute(steps=STEPS, finest: int = FINEST, frequencies=FREQUENCIES) -> dict:
             )
             for f in chosen
         ]
-        each = (
-            engine(how).walk(walkers, scene.numerics, 3) for how in ("planar", "mujoco")
+        finely = dataclasses.replace(scene.numerics, **fine)
+        planar = engine("planar").walk(walkers, finely, 3)
+        full = engine("mujoco").walk(walkers, scene.numerics, 3)
+        speeds[name] = (
+            chosen,
+            *(np.array([w.speed for w in x]) for x in (planar, full)),
         )
-        speeds[name] = (chosen, *(np.array([w.speed for w in walks]) for walks in each))
-    return {"steps": study, "speeds": speeds}
+    return {"errors": errors, "speeds": speeds}
 
 
 @plots.styled
 def draw(numbers: dict):
     fig, axes = plots.figure(8.4, 2.8, 1 + len(numbers["speeds"]))
     ax = axes[0, 0]
-    looks = {
-        "implicit": ("o-", style.BLUE, "implicit"),
-        "held": ("s-", style.VERMILION, "grains' forces held"),
-    }
-    for how, (steps, error) in numbers["steps"].items():
-        line, colour, label = looks[how]
-        ax.loglog(
-            steps,
-            np.where(np.isfinite(error), error, np.nan),
-            line,
-            color=colour,
-            lw=1.0,
-            label=label,
-        )
-    style.order_line(ax, *numbers["steps"]["implicit"], 2)
-    ax.set(xlabel="steps of a cycle", ylabel="error of the way")
+    looks = {"steps": ("o-", style.BLUE), "elements": ("s-", style.VERMILION)}
+    for name, (values, error) in numbers["errors"].items():
+        line, colour = looks[name]
+        ax.loglog(values, error, line, color=colour, lw=1.0, label=name)
+        style.order_line(ax, values, error, ORDERS[name])
+    ax.set(xlabel="steps of a cycle, elements", ylabel="error of the way")
+    ax.set_xticks([4, 8, 16, 32, 64], ["4", "8", "16", "32", "64"])
+    ax.set_xticks([], minor=True)
     ax.legend(loc="best", fontsize=7)
     for ax, (name, (frequency, planar, full)) in zip(
         axes[0, 1:], numbers["speeds"].items()

@@ -24,6 +24,8 @@ mujoco = pytest.importorskip(
     "mujoco", reason="needs the extra: pip install 'geomech[mujoco]'"
 )
 pytestmark = pytest.mark.usefixtures("fastest")
+from rft.mujoco import installed  # noqa: E402
+from rft.mujoco.installed import Effort  # noqa: E402
 from rft.terradynamics.walking import geoms, hexapod  # noqa: E402
 from rft.terradynamics.walking.mujoco_walk import (  # noqa: E402
     ROW,
@@ -111,13 +113,15 @@ def test_what_falls_free_falls_as_galilei_says():
     for _ in range(40):
         body.step(0.005)
     mujoco.mj_subtreeVel(model, data)
+    # Steps of order 1 fall by half a step's change of velocity more, in each.
+    fall = 9.81 * (0.02 + 0.2 * 0.005 / 16 / 2)
     np.testing.assert_allclose(
-        data.xipos[1], com + 0.2 * start + [0, 0, -9.81 * 0.02], atol=1e-4
+        data.xipos[1], com + 0.2 * start + [0, 0, -fall], atol=1e-5
     )
     np.testing.assert_allclose(
         data.subtree_angmom[0], spin, atol=1e-4 * np.linalg.norm(spin)
     )
-    assert body.energy() == pytest.approx(energy, rel=1e-4) and (
+    assert body.energy() == pytest.approx(energy, rel=2e-4) and (
         body.work,
         body.loss,
     ) == (0.0, 0.0)
@@ -148,20 +152,19 @@ def test_what_touches_grains_touches_no_floor():
         for _ in range(100):
             body.step(0.005)
         depths.append(0.02 - body.data.qpos[2])
-        assert (
-            body.unsolved == 0 and body.evaluations < 335
-        )  # 323: steps of Newton's method that go astray are halved
-        assert body.data.ncon == 0 and body.wrenches[0, 2] == pytest.approx(
+        assert body.unsolved == 0 and body.residual < 1e-4
+        assert body.data.ncon == 0 and body.data.qfrc_passive[2] == pytest.approx(
             model.body_mass[1] * 9.81, rel=0.02
         )
+        assert model.geom_contype[1] == 1  # of another's model, as it was
     assert depths[0] == depths[1] > 1e-3
     model = made(FLOORED.format("").replace('pos="0 0 0.05"', 'pos="0 0 -0.025"'))
     body = Multibody(
         model, geoms.surfaces(model, {"foot": foot(model)}), Grains(SPATIAL)
     )
-    assert body.data.ncon == 1 and model.geom_contype.tolist() == [1, 0, 1]
+    assert body.data.ncon == 1 and body.model.geom_contype.tolist() == [1, 0, 1]
     whole = Multibody(model, [Surface.from_mesh(1, foot(model))], Grains(SPATIAL))
-    assert whole.data.ncon == 0 and model.geom_contype.tolist() == [1, 0, 0]
+    assert whole.data.ncon == 0 and whole.model.geom_contype.tolist() == [1, 0, 0]
     paired = made(
         FLOORED.format('<contact><pair geom1="floor" geom2="foot"/></contact>')
     )
@@ -178,7 +181,7 @@ damping="0.02"/><geom name="g" type="sphere" size="0.05" pos="0.2 0 0" mass="0.3
 
 
 def test_springs_keep_energy_and_dampers_take_it():
-    """To the second order of the steps, which make no difference to what a halved step does."""
+    """To the order of the steps."""
     model, left = mujoco.MjModel.from_xml_string(PENDULUM), []
     for steps in (20, 40):
         body = Multibody(
@@ -192,23 +195,41 @@ def test_springs_keep_energy_and_dampers_take_it():
             body.step(0.25 / steps)
         left.append(abs(body.loss + body.energy() - first) / body.loss)
         assert body.work == 0.0 and body.loss > 0.02
-    assert left[1] < 1e-4 and left[0] / left[1] > 3.5
-    ends = []
-    for fails in (0, 1):
-        body = Multibody(
-            model,
-            geoms.surfaces(model, {"g": geoms.geom_mesh(model, 0, 8)}),
-            Grains(SPATIAL),
-        )
-        body.data.qvel[0], solved, tried = 2.0, body._step, iter([fails, 0, 0])
-        body._step = lambda *args: solved(*args) and not next(tried)
-        for h in (0.04,) if fails else (0.02, 0.02):
-            body.step(h)
-        ends.append([body.data.qpos[0], body.data.qvel[0], body.data.time, body.loss])
-    np.testing.assert_allclose(ends[0], ends[1], rtol=1e-12)
+    assert left[1] < 5e-3 and left[0] / left[1] == pytest.approx(2.0, rel=0.05)
 
 
-def test_steps_are_of_order_two_and_energy_is_kept_to_that():
+def test_steps_that_are_not_solved_are_counted_with_what_they_lack(monkeypatch):
+    """Two of them in the second of three time steps, by a thousandth of the momentum."""
+    model = mujoco.MjModel.from_xml_string(PENDULUM)
+    surfaces = geoms.surfaces(model, {"g": geoms.geom_mesh(model, 0, 8)})
+    body = Multibody(model, surfaces, Grains(SPATIAL))
+    none, two = Effort(9, 9, 9, 0, 0, 1e-6), Effort(9, 20, 9, 0, 2, 1e-3)
+    efforts = iter([none, none, none, two, two, two])
+    monkeypatch.setattr(installed, "effort", lambda row: next(efforts))
+    body.data.qvel[0] = 2.0
+    for _ in range(3):
+        body.step(1e-3)
+    assert mujoco.get_mjcb_passive() is None  # others may need it between walks
+    speed = math.hypot(0.2, math.sqrt(0.4) * 0.05) * 2.0  # of all its parts
+    assert (body.unsolved, body.iterations) == (2, 11)
+    assert body.residual == pytest.approx(1e-3 * speed, rel=0.05)
+    assert body.defect == pytest.approx(2e-3 * speed, rel=0.05)
+    assert body.state()[3:5] == (body.residual, body.defect)
+
+
+def test_legs_turn_by_their_clock_across_its_kinks():
+    """Of a clock with two rates, by 1e-4 rad, which is how far they yield to the robot's weight."""
+    walker = dataclasses.replace(XPLORER.walker, gait=Tripod(2.0, 0.3, 1.2))
+    one = Simulation(walker, QUICK)
+    rows, states = [], []
+    assert one.stride(0, rows, states) == ""
+    for row, state in zip(rows, states):
+        if row[0] < 0.5:  # at the end the rate is that of the next stride
+            angles, _ = one.clock.actuator_motion(row[0], row[0] - 1e-6)
+            np.testing.assert_allclose(state[7:], angles, atol=3e-4)
+
+
+def test_steps_are_of_order_one_and_energy_is_kept_to_that():
     """Xplorer in its plane at 4 Hz, after its fall: motors' work = losses + change of energy."""
     walker = dataclasses.replace(XPLORER.walker, gait=Tripod(4.0))
     fallen = Simulation(walker, dataclasses.replace(QUICK, steps=48), planar=True).walk(
@@ -217,32 +238,32 @@ def test_steps_are_of_order_two_and_energy_is_kept_to_that():
     run = lambda steps: Simulation(
         walker, dataclasses.replace(QUICK, steps=steps), planar=True
     ).walk(1, start=fallen.limit)
-    finest, errors, audits = run(112), [], []
-    np.testing.assert_allclose(finest.pose[0, 1:], fallen.pose[-1, 1:], atol=1e-12)
+    ends, audits = [], []
     for steps in (12, 24, 48):
         w = run(steps)
-        errors.append(
-            np.abs(w.pose[-1] - finest.pose[-1]).max() / np.abs(finest.pose).max()
-        )
-        audits.append(abs((w.work - w.loss - w.energy)[-1] + w.energy[0]) / w.work[-1])
+        ends.append(w.pose[-1])
+        audits.append(w.unaccounted)
         assert w.unsolved == 0
-    for values in (errors, audits):
-        assert -np.polyfit(np.log([12, 24, 48]), np.log(values), 1)[0] > 1.5, values
-    assert errors[-1] < 4e-3 and audits[-1] < 2e-3
+    np.testing.assert_allclose(w.pose[0, 1:], fallen.pose[-1, 1:], atol=1e-12)
+    changes = np.abs(np.diff(ends, axis=0)).max(1)
+    assert 1.6 < changes[0] / changes[1] < 2.6 and changes[1] < 1e-3
+    assert 1.6 < audits[0] / audits[1] < 2.6 and audits[2] < 0.02
 
 
 @pytest.mark.parametrize(("name", "frequency"), [("xplorer", 3.0), ("sandbot", 0.6366)])
 def test_speeds_are_those_of_the_planar_engine(name, frequency):
-    """Within 3 %, of a robot that may roll, yaw and drift, and within 2.5 % of one that keeps to the plane."""
+    """Where these are of 96 steps and 48 elements, within 1 %, though its own are of 16 steps and 12 elements; of a robot
+    that may roll, yaw and drift, and of one that keeps to the plane."""
     scene = scenes.load(name)
     effects = (Aeration(0.03, 0.25),) if name == "sandbot" else ()
     gait = dataclasses.replace(scene.gait, frequency=frequency)
     walker = dataclasses.replace(scene.walker, gait=gait, effects=effects)
-    finely = dataclasses.replace(QUICK, steps=12, elements=12)
+    finely = dataclasses.replace(QUICK, steps=96, elements=48)
+    coarse = dataclasses.replace(QUICK, steps=16, elements=12)
     wanted = planar_walk([walker], finely, 2)[0]
-    free = walk([walker], finely, 2)[0]
+    free = walk([walker], coarse, 2)[0]
     assert free.status == wanted.status == "walking" and free.speed == pytest.approx(
-        wanted.speed, rel=0.03
+        wanted.speed, rel=0.01
     )
     assert (
         np.abs(free.spatial["roll"]).max() < 0.06
@@ -254,8 +275,8 @@ def test_speeds_are_those_of_the_planar_engine(name, frequency):
         wanted.pose[:, 2].min(), abs=0.02
     )  # nose up, by ten degrees
     assert free.twist[:, 2].max() == pytest.approx(wanted.twist[:, 2].max(), rel=0.2)
-    kept = Simulation(walker, finely, planar=True).walk(8)
-    assert kept.speed == pytest.approx(wanted.speed, rel=0.025)
+    kept = Simulation(walker, coarse, planar=True).walk(8)
+    assert kept.speed == pytest.approx(wanted.speed, rel=0.01)
     assert np.abs(kept.spatial["roll"]).max() < 1e-12
 
 
@@ -413,7 +434,7 @@ def test_a_plain_wheel_rolls_as_fast_as_the_grains_bear_it():
     scene = WalkerScene(
         stress, Roller(2.0, wheel), Tripod(1.0), numerics=Fineness(elements=48)
     )
-    for engine, most in (("planar", 0.012), ("mujoco", 0.04)):
+    for engine, most in (("planar", 0.012), ("mujoco", 0.03)):
         (one,) = walked([scene], engine, settling=True)
         assert abs(one.walk.speed - truth) < one.estimate < most * truth
 
@@ -427,17 +448,17 @@ def test_the_figure_compares_steps_and_engines(monkeypatch):
     monkeypatch.setattr(walking_mujoco, "load", lambda name: coarse)
     monkeypatch.setattr(walking_mujoco, "MOST_STRIDES", 1)
     numbers = walking_mujoco.compute(
-        {"implicit": (12,), "held": (12,)}, 24, {"SandBot": ()}
+        {"steps": (8, 12)}, {"steps": 24}, {"SandBot": ()}, {}
     )
-    (_, implicit), (_, held) = numbers["steps"].values()
-    assert implicit.max() < 0.2 < held[0]
+    _, errors = numbers["errors"]["steps"]
+    assert errors[1] < errors[0] < 0.05
     numbers["speeds"]["SandBot"] = (
         (1.0, 2.0),
         np.array([0.1, 0.2]),
         np.array([0.1, 0.202]),
     )
     ways, speeds = walking_mujoco.draw(numbers).axes
-    np.testing.assert_allclose(curve(ways, "implicit"), [[12], implicit])
+    np.testing.assert_allclose(curve(ways, "steps"), [[8, 12], errors])
     np.testing.assert_allclose(curve(speeds, "MuJoCo"), [[1.0, 2.0], [0.1, 0.202]])
     assert (ways.get_ylabel(), speeds.get_title()) == (
         "error of the way",

@@ -723,6 +723,8 @@ def test_a_short_stance_has_steps_enough():
 
 def test_an_estimate_that_is_small_by_chance_is_not_taken(monkeypatch):
     """Of half and three quarters of the steps the larger change counts, and that with twice the elements besides."""
+    from rft.terradynamics.walking import planar_walk
+
     other = lambda numerics: {
         16: 0.0,
         24: 0.3,
@@ -739,11 +741,13 @@ def test_an_estimate_that_is_small_by_chance_is_not_taken(monkeypatch):
         rerun=lambda w, numerics, *rest, **more: [
             types.SimpleNamespace(**means(other(numerics)))
         ],
+        refined=planar_walk.refined,
     )
     monkeypatch.setattr(walking, "engine", lambda name: how)
     numerics = dataclasses.replace(XPLORER.numerics, steps=32, elements=12)
     (one,) = walking.walked([dataclasses.replace(XPLORER, numerics=numerics)])
-    change = 0.3 + walking.TO_COME * 0.02
+    change = 0.3 + 1.5 * 0.02
+    assert (one.steps, one.elements) == pytest.approx((0.3, 0.03))
     assert (one.estimate, one.lateral, one.turning) == pytest.approx(
         (0.001 + change, 2 * change, 3 * change)
     )

@@ -39,13 +39,16 @@ def error_of_run(
     seconds: float,
     control: Control | None,
     hulls: bool,
+    element: float | None = None,
 ) -> RunError:
     """Return `rft.mujoco.sand.Sand.error`."""
     state = _state(model, data)
     start = _places(model, bed, state, 0.0, 1, None)
     plain = _places(model, bed, state, seconds, 1, control)
     halved = _places(model, bed, state, seconds, 2, control)
-    finer = _places(model, _finer(model, bed, hulls), state, seconds, 1, control)
+    finer = _places(
+        model, _finer(model, bed, hulls, element), state, seconds, 1, control
+    )
     return RunError(
         _largest(plain, halved) / (1 - 2.0**-ORDER_OF_STEPS),
         _largest(plain, finer) / (1 - 2.0**-ORDER_OF_ELEMENTS),
@@ -86,19 +89,11 @@ def _places(model, bed: Bed, state, seconds: float, share: int, control) -> np.n
         installed.remove(row)
 
 
-def _finer(model: mujoco.MjModel, bed: Bed, hulls: bool) -> Bed:
-    """Return the bed with elements half as long on each geom."""
-    own = []
-    for number, geom in enumerate(bed.geoms):
-        begin, end = bed.blocks.first[number : number + 2]
-        edge = _mean_edge(np.stack([x[begin:end] for x in bed.blocks.faces[:9]]))
-        mesh = mesh_of_elements(model, int(geom), edge / 2, hulls)
+def _finer(model: mujoco.MjModel, bed: Bed, hulls: bool, element: float | None) -> Bed:
+    """Return the bed with elements half as long on each geom, in all directions. element: m, of edges; None for those that
+    the shapes ask for."""
+    half, own = element and element / 2, []
+    for geom in bed.geoms:
+        mesh = mesh_of_elements(model, int(geom), half, hulls, 1.0 if half else 0.5)
         own.append(faces(mesh.vertices[mesh.faces], mesh.middle_normals))
     return replace(bed, blocks=Blocks(own))
-
-
-def _mean_edge(corners: np.ndarray) -> float:
-    """Return the root mean square length of the edges of triangles, corners (9, T), m."""
-    points = corners.reshape(3, 3, -1)
-    edges = points - np.roll(points, 1, axis=0)
-    return float(np.sqrt((edges**2).sum(1).mean()))

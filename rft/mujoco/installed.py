@@ -91,10 +91,9 @@ class Seen(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """A bed in a row of the table. parts: of its model. bed: the sand. form: (G, 5), of
-    its geoms as their elements were made for. layout: for compiled code. counts:
-    (N_COUNTS,), of steps. largest: (1,), of their residuals. end: removes the bed when
-    the model is gone."""
+    """A bed in a row of the table. parts: of its model. bed: the sand. form: (G, 5), of its geoms as their elements were
+    made for. layout: for compiled code. counts: (N_COUNTS,), of steps. largest: (1,), of their residuals. end: removes
+    the bed when the model is gone."""
 
     parts: ModelParts
     bed: Bed

@@ -157,7 +157,9 @@ class Sand:
         control: function (model, data) that sets controls before each step."""
         model = self._check(data)
         in_range("seconds", seconds, 0, 1e6, unit="s")
-        return error_of_run(model, self._bed, data, seconds, control, self._hulls)
+        return error_of_run(
+            model, self._bed, data, seconds, control, self._hulls, self.element
+        )
 
     @property
     def effort(self) -> installed.Effort:

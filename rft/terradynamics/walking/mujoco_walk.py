@@ -1,12 +1,11 @@
 """The engine of three dimensions: robots as MuJoCo models in sand
 (`rft.terradynamics.walking.multibody`), one after the other.
 
-MuJoCo's steps are of order 1, and its triangles lead as a whole or not at all. So it
-takes `SUBSTEPS` for each time step, and cuts an element of a leg or belly into
-`PIECES`, which makes both errors as small as those of the planar engine. A robot of the
-vertical plane becomes a hull on legs at both sides that is free to roll, yaw and drift
-(`rft.terradynamics.walking.hexapod`); a custom MJCF is used as it is. A walk ends with
-the stride that repeats the last one.
+MuJoCo's steps are of order 1, and its triangles lead as a whole or not at all. So it takes `SUBSTEPS` for each time step,
+and cuts an element of a leg or belly into `PIECES`, which makes both errors as small as those of the planar engine.
+
+A robot of the vertical plane becomes a hull on legs at both sides that is free to roll, yaw and drift
+(`rft.terradynamics.walking.hexapod`); a custom MJCF is used as it is. A walk ends with the stride that repeats the last one.
 """
 
 from __future__ import annotations
@@ -154,10 +153,11 @@ def step_cost(
         Simulation(walker, numerics).body,
         1 / (walker.gait.frequency * numerics.steps),
     )
-    begin, elapsed, steps = time.process_time(), 0.0, 0
-    while steps < numerics.steps and elapsed < seconds:
-        body.step(h)
-        elapsed, steps = time.process_time() - begin, steps + 1
+    with body.in_sand():
+        begin, elapsed, steps = time.process_time(), 0.0, 0
+        while steps < numerics.steps and elapsed < seconds:
+            body.step(h)
+            elapsed, steps = time.process_time() - begin, steps + 1
     return elapsed / steps, body.iterations / (steps * body.substeps)
 
 
@@ -330,9 +330,13 @@ class Simulation:
         return self.end_status()
 
     def steps(self, stride: int, state: tuple) -> tuple[np.ndarray, np.ndarray, tuple]:
-        """Return rows and positions after each step of a stride, or until the robot's
-        end, and the body's state then. state: that of the body now, on which the result
-        depends."""
+        """Return rows and positions after each step of a stride, or until the robot's end, and the body's state then. state:
+        that of the body now, on which the result depends."""
+        with self.body.in_sand():
+            return self._steps(stride)
+
+    def _steps(self, stride: int) -> tuple[np.ndarray, np.ndarray, tuple]:
+        """Return what `steps` does, in the sand."""
         rows, states = [], []
         f, data = self.gait.frequency, self.body.data
         for begin, end, steps in self.intervals:

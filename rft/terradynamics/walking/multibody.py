@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import copy
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 
 import mujoco
 import numpy as np
@@ -24,6 +25,7 @@ from rft.terradynamics.meshes.zones import EVERYWHERE
 from rft.terradynamics.walking.facets import Facets, Grains, Surface
 
 SUBSTEPS = 16  # steps of MuJoCo in a time step
+NO_ROW = -1  # of the table of beds, where the bed is not under its model
 IMPLICIT_FAST = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
 ENERGY = int(mujoco.mjtEnableBit.mjENBL_ENERGY)
 NO_RESET = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
@@ -94,11 +96,11 @@ class Multibody:
         self.control, self.substeps = control, substeps
         self.work = self.loss = self.defect = self.residual = 0.0
         self.unsolved = self.iterations = 0
-        self._row = installed.install(model, bed_under(model, surfaces, grains))
+        self._bed, self._row = bed_under(model, surfaces, grains), NO_ROW
         structure = model if hasattr(model, "D_rownnz") else self.data
         self._slope_rows = np.repeat(np.arange(model.nv), structure.D_rownnz)
         self._slope_columns = np.array(structure.D_colind)
-        mujoco.mj_kinematics(model, self.data)
+        self.update()
         self.size = self._sizes()
 
     def _sizes(self) -> np.ndarray:
@@ -144,9 +146,27 @@ class Multibody:
         mujoco.mj_setState(self.model, self.data, numbers, STATE)
         self.update()
 
+    @contextmanager
+    def in_sand(self) -> Iterator[None]:
+        """Put the sand under the model for some steps, of which each does so by itself otherwise, in a millisecond."""
+        if self._row != NO_ROW:
+            yield
+            return
+        self._row = installed.install(self.model, self._bed)
+        try:
+            yield
+        finally:
+            # At once: MuJoCo has one passive callback, which others may need next.
+            installed.remove(self._row)
+            self._row = NO_ROW
+
     def step(self, h: float, rate_time: float | None = None) -> None:
-        """Take a time step h, s, with the controls' rates at ``rate_time``, s, by
-        default the middle of the step."""
+        """Take a time step h, s, with the controls' rates at ``rate_time``, s, by default the middle of the step."""
+        with self.in_sand():
+            self._step(h, rate_time)
+
+    def _step(self, h: float, rate_time: float | None) -> None:
+        """Take a time step in the sand."""
         model, data = self.model, self.data
         begin, before = data.time, installed.effort(self._row)
         rate_time = begin + h / 2 if rate_time is None else rate_time
