@@ -167,7 +167,7 @@ def test_a_drag_is_a_file_that_fit_medium_reads(towed, tmp_path):
     result.save(path)
     told = path.read_text().splitlines()
     for line, said in (
-        (0, "geomech drag-grains --length 0.18 --radius 0.007 --speed 0.2 --angles 0,10,20,40,65,90 --beds 2 --seed 4"),
+        (0, "geomech drag-grains --length 0.18 --radius 0.007 --angles 0,10,20,40,65,90 --beds 2 --seed 4 --speed 0.2"),
         (1, "mean after 17.5 mm of travel"),
         (2, "grains 6 mm +-7 %, density 1030 kg/m^3, packing 0.6000; rod 14 mm diameter x 180 mm"),
         (2, ", axis 25.50 mm deep, 0.2 m/s"),

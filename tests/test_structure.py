@@ -212,13 +212,11 @@ SPEAK_OF_OPTIONS = (
     "command.py",
     "describe/",
     "options.py",
-    "output/",
     "pipeline.py",
     "questions/base.py",
     "questions/loading.py",
     "questions/texts.py",
     "renamed.py",
-    "text/",
     "cli.py",
     "terminal.py",
 )  # of geomech: parts of commands alone

@@ -1,11 +1,11 @@
 """The drag of grains on a rod and on its ends, and the law that is fitted to it."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from geomech.questions import parsing
+from geomech.questions import parsing, tools
 from geomech.questions.base import Option, Question, Run
 from geomech.questions.common import Store
 
@@ -35,7 +35,9 @@ def write_drag(path: Path, result: "Result") -> None:
     drag of a flank as long as the rod."""
     from geomech.io.files import write_text
 
-    lines = [f"# {line}" for line in result.attributes["drag_about"].splitlines()]
+    facts = result.attributes
+    about = [facts["command"], *facts["drag_about"].splitlines()]
+    lines = [f"# {line}" for line in about]
     lines.append(",".join(COLUMNS))
     length = float(result["rod_length"])
     flank, ends, lift = result["flank"], result["ends"], result["lift"]
@@ -103,12 +105,8 @@ class DragGrains(Question):
     @cached_property
     def study(self) -> "DraggedRod":
         from geomech.studies.grains import DraggedRod
-        from rft.grains.bed import Bed
 
-        bed = self.bed
-        if bed is None:
-            bed = Bed()
-        return DraggedRod(
+        rod = DraggedRod(
             self.length,
             self.radius,
             self.angles,
@@ -116,8 +114,10 @@ class DragGrains(Question):
             self.speed,
             self.depth,
             self.seed,
-            bed,
         )
+        if self.bed is None:
+            return rod
+        return replace(rod, bed=self.bed)
 
     @property
     def store_folder(self) -> Path:
@@ -133,7 +133,9 @@ class DragGrains(Question):
         return self.study.cost(self.store_folder)
 
     def compute(self, run: Run) -> "Result":
-        return self.study.answer(self.store_folder, run.progress)
+        result = self.study.answer(self.store_folder, run.progress)
+        facts = {**result.attributes, "command": tools.command_line(self)}
+        return replace(result, attributes=facts)
 
     @staticmethod
     def files() -> dict[str, Any]:
@@ -165,7 +167,7 @@ class DragGrains(Question):
             f"errors of drag: {result['mean_lift'].error_label}; of the law: half widths "
             "of intervals with 95 %",
             f"largest overlap {overlap:.3f} grain diameters",
-            "-o FILE.csv writes what 'geomech fit-medium FILE.csv --end-caps fitted' takes",
+            "-o FILE.csv writes a file for 'geomech fit-medium'",
         ]
 
     @staticmethod

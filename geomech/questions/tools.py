@@ -1,9 +1,12 @@
 """What several questions make their results with."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
+
+from geomech.questions import base
+from rft.core.refusal import in_line
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -34,6 +37,32 @@ def words(names: Any) -> Any:
     if isinstance(names, str):
         return (names,)
     return tuple(names)
+
+
+def command_line(question: base.Question) -> str:
+    """Return the command that asks a question, without its output and without options on
+    which its answer does not depend."""
+    compared = [one.name for one in fields(question) if one.compare]
+    words = ["geomech", question.name.replace("_", "-")]
+    if question.subject is not None:
+        words.append(in_line(question.subject_name))
+    for name, (option, _, _) in base.options(type(question)).items():
+        value = getattr(question, name)
+        if name not in compared or value is None or value is False:
+            continue
+        words.append(base.flag(name, option))
+        if value is not True:
+            words.append(option_text(value))
+    return " ".join(words)
+
+
+def option_text(value: Any) -> str:
+    """Return the value of an option as it is typed."""
+    if isinstance(value, tuple):
+        return ",".join(map(option_text, value))
+    if isinstance(value, float):
+        return f"{value:g}"
+    return str(value)
 
 
 def component() -> "Variable":

@@ -18,7 +18,7 @@ from geomech.studies.calibration import fit_variables
 from rft.core.refusal import Refusal, require
 from rft.fits.rods import Fit, fit
 from rft.grains.bed import Bed
-from rft.grains.drag import Drag, flank_and_ends
+from rft.grains.drag import SETTLED, Drag, flank_and_ends
 from rft.grains.engine import lammps
 from rft.grains.experiment import SETTLING, Experiment, Run, settle
 from rft.grains.motions import Tow
@@ -29,7 +29,7 @@ from rft.laws.drag import Rod, rod_drag
 # written on.
 RATE = 1.8e6
 LONGEST = 600.0  # s of computing that a command begins without consent
-TRAVEL = 7.5  # half widths that a rod is dragged, the first 2.5 of them not counted
+TRAVEL = 7.5  # half widths that a rod is dragged, the first `SETTLED` not counted
 Progress = Callable[[float], None]
 
 
@@ -234,18 +234,17 @@ class DraggedRod:
     def about(
         self, packing: float, depth: float, overlap: float, rows: np.ndarray
     ) -> str:
-        """Return what a file of the drag says above its columns, which gives
-        ``fit-medium`` the sizes."""
+        """Return what a file of the drag says above its columns, which gives a fit of the
+        medium its sizes."""
         bed, mm = self.bed, 1e3
         walls = "walled" if bed.walled else "periodic"
         friction = f"friction {bed.friction:g}"
         if bed.settling_friction is not None:
             friction += f", settled with friction {bed.settling_friction:g}"
         lines = [
-            self.command,
             "Drag on the flank of a rod, and on both its ends together beyond that, in "
             f"beds of grains (LAMMPS {int(rows[0, 0, 11])}, Hertz-Mindlin); mean after "
-            f"{mm * 2.5 * self.radius:g} mm of travel",
+            f"{mm * SETTLED * self.radius:g} mm of travel",
             f"grains {mm * bed.diameter:g} mm +-{100 * bed.spread:g} %, density "
             f"{bed.density:g} kg/m^3, packing {packing:.4f}; rod "
             f"{2 * mm * self.radius:g} mm diameter x {mm * self.length:g} mm, axis "
@@ -259,20 +258,6 @@ class DraggedRod:
             "errors: standard errors in time",
         ]
         return "\n".join(lines)
-
-    @property
-    def command(self) -> str:
-        """The command that gives the result, without its output; numbers of the bed that
-        no option has stand in the file."""
-        angles = ",".join(f"{x:g}" for x in self.angles)
-        words = [
-            "geomech drag-grains",
-            f"--length {self.length:g} --radius {self.radius:g} --speed {self.speed:g}",
-        ]
-        if self.depth is not None:
-            words.append(f"--depth {self.depth:g}")
-        words.append(f"--angles {angles} --beds {self.beds} --seed {self.seed}")
-        return " ".join(words)
 
 
 def mean_over_beds(variable: Variable) -> Variable:
