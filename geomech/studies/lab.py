@@ -41,6 +41,15 @@ class Lab:
         return self.scenes[0]
 
     @property
+    def subject(self) -> Scene:
+        """The scene whose cost is told."""
+        return self.scene
+
+    @property
+    def subject_name(self) -> str:
+        return self.scene.name
+
+    @property
     def title(self) -> str:
         """Name of the computation, shown during it."""
         return f"charts of {', '.join(scene.name for scene in self.scenes)}"

@@ -240,7 +240,7 @@ def quantities(
     amplitude = width / 2 / body[:, None]
     numbers = {
         "frequency": 1 / time,
-        "length": body,
+        "body_length": body,
         "speed": speed,
         "stride": distance / body,
         "heading": axis + drift,
