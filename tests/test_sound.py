@@ -12,7 +12,7 @@ import geomech
 from geomech import scenes
 from rft.balance.backend import Note
 from rft.meshes import Mesh, MeshFile, Spatial, read, shapes, sound, wrench
-from rft.mujoco.geoms import geom_mesh
+from rft.mujoco.geoms import mesh_of_elements
 from rft.refusal import Refusal
 
 BALL = shapes.sphere(0.02, 2)
@@ -292,7 +292,7 @@ def test_a_mesh_geom_bears_as_a_mesh_of_a_file():
         </worldbody></mujoco>"""
     )
     with pytest.warns(Note, match="shell inside another"):
-        mesh = geom_mesh(model, 0, 24)
+        mesh = mesh_of_elements(model, 0)
     assert mesh.volume == pytest.approx(BALL.volume, rel=1e-5)
 
 
