@@ -21,7 +21,7 @@ from rft.terradynamics.meshes import (
     sound,
     wrench,
 )
-from rft.terradynamics.meshes.geoms import geom_mesh
+from rft.terradynamics.meshes.geoms import mesh_of_elements
 
 BALL = shapes.sphere(0.02, 2)
 BOX = shapes.box((0.02, 0.02, 0.02), 2)
@@ -300,7 +300,7 @@ def test_a_mesh_geom_bears_as_a_mesh_of_a_file():
         </worldbody></mujoco>"""
     )
     with pytest.warns(Note, match="shell inside another"):
-        mesh = geom_mesh(model, 0, 24)
+        mesh = mesh_of_elements(model, 0)
     assert mesh.volume == pytest.approx(BALL.volume, rel=1e-5)
 
 

@@ -32,9 +32,9 @@ PILOT = 0.05  # s of time steps that are timed
 STATUSES = ("walking", "stuck", "sunk", "flipped", "airborne")
 TOGETHER = 32  # robots in a batch
 SETTLING = 3  # cycles from rest in a sweep, before the limit cycle is looked for
-STEP = 200.0  # balances that take NumPy as long as a time step
-# evaluations of forces in a step; the first steps of the built-in robots take 7 to 14
-HARD = 30.0
+STEP = 200.0  # balances that take NumPy as long as a time step in the plane
+STEP_IN_SPACE = 11_000.0  # and as one in three dimensions, 55 ms
+HARD = 30.0  # evaluations of forces in a step; the first steps of the built-in robots take 7 to 14
 PUSHED = 0.2  # acceleration of a body by much faster legs over gravity, measured
 IN_VAIN = (
     40  # cycles of a failing search for a limit cycle with its errors, many at once
@@ -236,12 +236,12 @@ def motion(run: Walked) -> list[Variable]:
 
 
 class Steps(Cost):
-    """Cost of walking; balances counts the time steps."""
+    """Cost of walking; balances counts the time steps, steps those in three dimensions."""
 
     @property
     def as_balances(self) -> float:
-        """Number of balances that take NumPy as long: some 200 for each time step."""
-        return STEP * self.balances
+        """Number of balances that take NumPy as long."""
+        return STEP * (self.balances - self.steps) + STEP_IN_SPACE * self.steps
 
     def __str__(self) -> str:
         return (
@@ -268,7 +268,8 @@ def price(
         chosen = engine(engine_name)
     again = LIMIT * sum(refined.cost for refined in chosen.refined(numerics))
     least = (cycles + again) * numerics.steps * count
-    with located(scene.name), prefer_backend(STEP * least if planar else 0.0):
+    step = STEP if planar else STEP_IN_SPACE
+    with located(scene.name), prefer_backend(step * least):
         step_seconds, tries = chosen.step_cost(
             [scene.walker] * together, numerics, PILOT
         )
@@ -276,7 +277,8 @@ def price(
     cycles = most + vain if vain else cycles
     steps = (cycles + again) * numerics.steps
     seconds = step_seconds * steps * -(-count // together)
-    return Steps(round(steps * count), seconds, BASE, seconds)
+    total = round(steps * count)
+    return Steps(total, seconds, BASE, seconds, 0.0 if planar else total)
 
 
 def _speeding_up(scene: WalkerScene) -> float:
@@ -368,7 +370,8 @@ class Settings:
         )
         one = price(self.scene, settling=True)
         seconds = one.seconds * shares / 2
-        return Steps(round(one.balances * shares / 2), seconds, BASE, seconds)
+        balances, steps = (round(x * shares / 2) for x in (one.balances, one.steps))
+        return Steps(balances, seconds, BASE, seconds, steps)
 
     def prepared(self) -> Settings:
         (walk,) = engine(self.scene.engine).walk(

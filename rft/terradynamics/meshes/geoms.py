@@ -30,39 +30,6 @@ PER_REACH, PER_REACH_OF_MESH = 5, 6
 MOST_PIECES = 12  # of a slender round geom, by default
 
 
-def geom_mesh(model: mujoco.MjModel, geom: int, elements: int) -> Mesh:
-    """Return the mesh of a geom in its own frame, with smooth normals, and ``elements``
-    edges around round geoms; ValueError for a geom that has no inside."""
-    kind, size = (
-        mujoco.mjtGeom(model.geom_type[geom]).name.removeprefix("mjGEOM_").lower(),
-        model.geom_size[geom],
-    )
-    along = max(1, elements // 6)
-    if kind == "mesh":
-        return smooth(_model_mesh(model, int(model.geom_dataid[geom])))
-    if kind == "box":
-        return shapes.box(2 * size, along)
-    if kind == "capsule":
-        return smooth(shapes.capsule(size[0], size[1], elements, along))
-    if kind == "cylinder":
-        rod = shapes.cylinder(
-            size[0], 2 * size[1], elements, along, max(1, elements // 12)
-        )
-        return smooth(Mesh(rod.vertices @ ALONG_Z, rod.faces))
-    cure = "give a sphere, ellipsoid, cylinder, capsule, box or mesh"
-    require(
-        kind in ("sphere", "ellipsoid"),
-        f"a {kind} cannot touch the ground",
-        instead=cure,
-    )
-    ball = shapes.sphere(
-        1.0, int(np.clip(np.ceil(np.log2(elements / 5)), 1, 5))
-    )  # 5 edges around, twice that, ...
-    return smooth(
-        Mesh(ball.vertices * (size if kind == "ellipsoid" else size[0]), ball.faces)
-    )
-
-
 def mesh_of_elements(
     model: mujoco.MjModel,
     geom: int,
