@@ -1,4 +1,5 @@
-"""Steps in sand: bodies that stop stay where they are, at the steps that robots take; forces, errors and order of the steps."""
+"""Steps in sand: bodies that stop stay where they are, at the steps that robots take;
+forces, errors and order of the steps."""
 
 import warnings
 
