@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rft.motion.stepping import TimeSteps, time_steps
     from rft.motion.work import Work, work_done
 
-SOLVER = 12  # version of the numbers, raised with every change of one; results of other versions are not resumed
+SOLVER = 13  # version of the numbers, raised with every change of one; results of other versions are not resumed
 _NAMES = {
     "rft.balance.velocity": "Solution body_velocity",
     "rft.bodies": "Backbone Body Chain ConstantCurvature Serpenoid",

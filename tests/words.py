@@ -58,7 +58,7 @@ MASKS = [
     (r"^back end: .*$", "back end: #"),
     (r"^seconds: .*$", "seconds: #"),
     (r"\d+ cycles evaluated in [\d.]+ s", "# cycles evaluated in # s"),
-    (r"^( *[\d.e-]+ +elements .*) [\d.]+$", r"\1 #"),
+    (r"^( *[\d.e-]+ +elements .*[\d-]) +[\d.]+$", r"\1 #"),
     (r"in\s+[\d.e-]+\s+to\s+[\d.e-]+ s\b", "in # to # s"),
     (r"force balances, [\d.e-]+ s$", "force balances, # s"),
     (r"residual [\d.e+-]+, \d+ iterations", "residual #, # iterations"),
