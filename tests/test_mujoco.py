@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from geomech import scenes
 from geomech.scenes import WalkerScene
 from geomech.studies.walking import walked
+from rft.balance import backend
 from rft.core.metres import GRAVITY
 from rft.terradynamics.ground import Aeration, GrainInertia
 from rft.terradynamics.meshes import Spatial, wrench
@@ -24,6 +25,9 @@ mujoco = pytest.importorskip(
     "mujoco", reason="needs the extra: pip install 'geomech[mujoco]'"
 )
 pytestmark = pytest.mark.usefixtures("fastest")
+needs_numba = pytest.mark.skipif(
+    not backend.installed(), reason="needs the extra: pip install 'geomech[fast]'"
+)
 from rft.mujoco import installed  # noqa: E402
 from rft.mujoco.installed import Effort  # noqa: E402
 from rft.terradynamics.walking import geoms, hexapod  # noqa: E402
@@ -229,6 +233,7 @@ def test_legs_turn_by_their_clock_across_its_kinks():
             np.testing.assert_allclose(state[7:], angles, atol=3e-4)
 
 
+@needs_numba
 def test_steps_are_of_order_one_and_energy_is_kept_to_that():
     """Xplorer in its plane at 4 Hz, after its fall: motors' work = losses + change of energy."""
     walker = dataclasses.replace(XPLORER.walker, gait=Tripod(4.0))
@@ -250,6 +255,7 @@ def test_steps_are_of_order_one_and_energy_is_kept_to_that():
     assert 1.6 < audits[0] / audits[1] < 2.6 and audits[2] < 0.02
 
 
+@needs_numba
 @pytest.mark.parametrize(("name", "frequency"), [("xplorer", 3.0), ("sandbot", 0.6366)])
 def test_speeds_are_those_of_the_planar_engine(name, frequency):
     """Where these are of 96 steps and 48 elements, within 1 %, though its own are of 16 steps and 12 elements; of a robot
@@ -349,6 +355,7 @@ def test_legs_alternate_as_in_the_plane():
     assert hexapod.mjcf(robot).count('type="hinge"') == 6
 
 
+@needs_numba
 def test_every_end_has_its_status_and_no_nan():
     still = dataclasses.replace(XPLORER.robot, hip_height=0.08)
     long = dataclasses.replace(XPLORER.robot, hips=(-0.06,), legs=CLeg(0.05, 0.01))
@@ -420,6 +427,7 @@ def test_who_turns_is_not_told_by_strides_along_a_line(turn, monkeypatch):
     np.testing.assert_allclose(found.spatial["y"][1:], way.imag, atol=1e-9)
 
 
+@needs_numba
 def test_a_plain_wheel_rolls_as_fast_as_the_grains_bear_it():
     """At the default grazing, where triangles lead or do not as a whole: against the balance of forces of a wheel of 400
     elements, with the slip at which it pulls nothing; both engines tell how far they are off."""
@@ -439,6 +447,7 @@ def test_a_plain_wheel_rolls_as_fast_as_the_grains_bear_it():
         assert abs(one.walk.speed - truth) < one.estimate < most * truth
 
 
+@needs_numba
 def test_the_figure_compares_steps_and_engines(monkeypatch):
     from figures import walking_mujoco
 
