@@ -12,8 +12,8 @@ def compute(scene: str = "three-link-glass", runs: int = 2) -> Result:
     return geomech.accuracy(scene, runs=runs)
 
 
-def draw(result: Result):
-    return result.plot()
+def draw(numbers: Result):
+    return numbers.plot()
 
 
 if __name__ == "__main__":

@@ -237,7 +237,7 @@ def test_what_leaves_the_library_has_one_unit_and_says_it():
     length = 7.5
     (one, plain), (made, table) = of_length(None), of_length(length)
     lengths = {u for v in table.variables for u in np.atleast_1d(v.unit)}
-    assert lengths == {"", "m", "m/s", "BL/s", "rad", "rad/s", "s", "1"}
+    assert lengths == {"", "m", "m/s", "BL/s", "rad", "rad/s", "rad2", "s", "1"}
     assert [v.name for v in table.variables if v.unit == "BL/s"] == [
         "speed_body_lengths"
     ]

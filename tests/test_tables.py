@@ -935,7 +935,7 @@ def test_what_accuracy_costs_includes_the_tables_own_error(made, monkeypatch):
     )
     found = api.accuracy(scene, runs=1)
     amplitudes = found["amplitude"].values
-    own = scene.system.table_error(*GAIT.cycle(64, amplitudes))[:, 0].max()
+    own = table_error(scene.system, *GAIT.cycle(64, amplitudes))[:, 0].max()
     assert float(found["own_error"]) == own and 1e-4 < own < 0.1
     tolerances, error = found["tolerance"].values, found["best_error"].values
     np.testing.assert_array_equal(np.isnan(error), tolerances < own)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -68,9 +68,11 @@ def walk_stage(
 ) -> Callable[[int], None]:
     """Draw the ground on axes that hold the robot at these rows of its walk; return a
     function that draws it at one. follow: the axes move with the robot."""
-    robot: Any = Flat(result)
+    robot: Flat | Solid
     if "states" in result:
         robot = Solid(result)
+    else:
+        robot = Flat(result)
     reach, room = robot.reach, 1.1 * robot.room
     t, x = result["t"].values, result["x"].values
     seen = x[rows]
