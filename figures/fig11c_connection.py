@@ -5,13 +5,13 @@ from __future__ import annotations
 from figures import main, style
 from geomech import plots
 from geomech.scenes import load
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 
 
 def compute(scene: str = "three-link-glass", **numerics) -> dict:
     """Return the connection on its grid, and the gait."""
     loaded = load(scene).with_numerics(**numerics)
-    return {"connection": Study(loaded).fitted, "gait": loaded.gait}
+    return {"connection": SceneTables(loaded).fitted, "gait": loaded.gait}
 
 
 @plots.styled

@@ -6,13 +6,13 @@ from figures import main
 from geomech import plots
 from geomech.gaits import Butterfly
 from geomech.scenes import load
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 
 
 def compute(scene: str = "three-link-glass", **numerics) -> dict:
     """Return the CCF on its grid and its error (Fields with values (3, N, N)), and the gaits."""
     loaded = load(scene).with_numerics(**numerics)
-    study = Study(loaded)
+    study = SceneTables(loaded)
     return {
         "ccf": study.curvature,
         "error": study.curvature_error,

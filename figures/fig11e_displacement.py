@@ -9,7 +9,7 @@ from figures import main
 from geomech import plots
 from geomech.gaits import Butterfly, Circle
 from geomech.scenes import load
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.tiers import TIERS
 
 GAITS = {"circle": Circle(reverse=True), "butterfly": Butterfly()}
@@ -22,7 +22,7 @@ AMPLITUDES = {
 def compute(scene: str = "three-link-glass", amplitudes: dict | None = None) -> dict:
     """Return the displacements of each gait, by amplitude and tier."""
     loaded, amplitudes = load(scene), amplitudes or AMPLITUDES
-    study = Study(loaded)
+    study = SceneTables(loaded)
     tables = {
         name: study.displacements(a, [*TIERS], GAITS[name])
         for name, a in amplitudes.items()

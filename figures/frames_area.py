@@ -14,7 +14,7 @@ from figures import main, style
 from geomech import plots
 from geomech.gaits import Butterfly, Circle
 from geomech.scenes import load
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 
 FRAMES = "mean", "link-2", "minimum-perturbation"
 GAITS = {
@@ -28,7 +28,7 @@ def compute(scene: str = "three-link-glass", count: int = 20, grid: int = 31) ->
 
     The field reaches as far as the gaits.
     """
-    study = Study(load(scene)).with_numerics(grid=grid, extent=2.7)
+    study = SceneTables(load(scene)).with_numerics(grid=grid, extent=2.7)
     found: dict = {
         name: {"amplitude": np.linspace(0, top, count + 1)[1:]}
         for name, (_, top, _) in GAITS.items()

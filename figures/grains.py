@@ -25,7 +25,7 @@ from figures.fig08a_rods import rod_forces
 from geomech import plots
 from geomech.scenes import load
 from geomech.studies.calibration import rod_fit
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from rft import EndCaps, Transient
 from rft.grains.reversal import Recovery, recovery
 from rft.terradynamics.plates import VERTICAL, HalfCylinder, RoundRod
@@ -84,7 +84,7 @@ def predicted(scene_name: str, amplitudes, travels=TRAVELS) -> dict:
     law, scene = rod_fit("flank-drag", end_caps="fitted"), load(scene_name)
     caps = law.caps(RADIUS / SIZE)
     medium = replace(law.medium, covariance=None)
-    study = lambda medium, tiers, *effects: Study(
+    study = lambda medium, tiers, *effects: SceneTables(
         scene.changed(system=replace(scene.system, medium=medium, effects=effects))
     ).displacements(list(amplitudes), tiers)["net_distance"]
     none = np.zeros(len(amplitudes))

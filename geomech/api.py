@@ -29,7 +29,7 @@ from geomech.questions.trajectory import Trajectory
 from geomech.questions.velocity import Velocity
 from geomech.questions.walk import Walk
 from geomech.scenes.parts import as_scene
-from geomech.studies import study as studies
+from geomech.studies.scene_tables import SceneTables
 from rft.core.refusal import Refusal
 
 Fields = ParamSpec("Fields")
@@ -181,14 +181,14 @@ class Study:
         return notebook.study(self.tables)
 
     @cached_property
-    def _tables(self) -> studies.Study | None:
+    def _tables(self) -> SceneTables | None:
         """The tables of a scene with a gait in shape space; None of another."""
         if not hasattr(self.scene, "system"):
             return None
-        return studies.Study(self.scene)
+        return SceneTables(self.scene)
 
     @property
-    def tables(self) -> studies.Study:
+    def tables(self) -> SceneTables:
         """What is computed of the scene: connection, CCF, metric, poses by tier."""
         if self._tables is None:
             raise Refusal("this scene has no shape space", where=self.scene.name)

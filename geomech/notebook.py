@@ -10,7 +10,7 @@ from geomech.describe.system import described
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
 from geomech.results.html import encoded, escaped, row
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 
 
 def page(
@@ -46,7 +46,7 @@ def field(values: Field) -> str:
     return page(repr(values), picture=picture)
 
 
-def study(tables: Study) -> str:
+def study(tables: SceneTables) -> str:
     """Return the scene and tiers of a study and, where it is computed already, the CCF
     with the scene's gait."""
     scene, computed = tables.scene, {key[0] for key in tables.computed}

@@ -11,8 +11,8 @@ from geomech.core.setting import Setting
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection
 from geomech.studies import tiered
+from geomech.studies.scene_tables import SceneTables
 from geomech.studies.settings import Measured, cheapest, padded
-from geomech.studies.study import Study
 from geomech.tiers.direct import direct
 from rft import Chain, Viscous, body_velocity
 
@@ -132,7 +132,7 @@ def test_families_are_of_order_four_where_nothing_kinks():
     exact = direct(viscous.system.velocity, Circle(), a)
     errors = []
     for n in counts:
-        adapted = Study(viscous.with_numerics(curves=int(n))).poses(
+        adapted = SceneTables(viscous.with_numerics(curves=int(n))).poses(
             "adapted", Circle(), a
         )
         errors.append(np.abs(adapted - exact).max())

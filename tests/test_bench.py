@@ -12,7 +12,7 @@ from geomech import scenes
 from geomech.gaits import Circle, Fourier, Sine
 from geomech.geometry import connection
 from geomech.scenes import Numerics, Scene
-from geomech.studies.study import Study, refuse_outside
+from geomech.studies.scene_tables import SceneTables, refuse_outside
 from geomech.systems import Solver, Swimmer
 from geomech.systems.base import length_unit
 from geomech.systems.capabilities import solver_of
@@ -35,7 +35,7 @@ def fits(monkeypatch):
 
 
 def test_tables_are_kept_under_what_they_depend_on(fits):
-    study = Study(GLASS)
+    study = SceneTables(GLASS)
     first = study.poses("path")
     study.poses("area", amplitudes=[0.3, 0.5])
     finer = study.with_numerics(phases=64)
@@ -72,7 +72,7 @@ def test_a_scene_is_small_and_remembers_nothing():
     for name in scenes.builtin_names():
         scene = scenes.load(name)
         held = dict(scene.__dict__)
-        study = Study(
+        study = SceneTables(
             scene.with_numerics(phases=32, grid=5) if solver_of(scene.system) else scene
         )
         study.poses("direct", amplitudes=[scene.gait.amplitude / 2])
@@ -208,9 +208,9 @@ def test_the_frame_is_the_scenes():
         and "frame" not in scenes.tables(top.changed(text=""))["body"]
     )
     turned = top.changed(system=in_frame(top.system, "link-3"))
-    assert turned.frame == "link-3" and Study(turned.with_numerics(phases=32)).poses(
-        "direct"
-    ).shape == (3,)
+    assert turned.frame == "link-3" and SceneTables(
+        turned.with_numerics(phases=32)
+    ).poses("direct").shape == (3,)
 
 
 def test_a_swimmer_may_be_told_in_full():

@@ -16,7 +16,7 @@ from figures.cost_scaling import NAMES, backends, one_scipy_solve, quickest
 from geomech.gaits import Butterfly, Circle, Sine
 from geomech.geometry import connection
 from geomech.scenes import load
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems import Solver, Swimmer
 from geomech.tiers.direct import direct
 from rft import CATALOGUE, Backbone, Chain, Transient, body_velocity, time_steps
@@ -185,7 +185,7 @@ def test_the_geometers_pipeline():
     scene = load("three-link-viscous").with_numerics(grid=31)
 
     def pipeline():
-        study = Study(scene)
+        study = SceneTables(scene)
         seen = study.in_frame("minimum-perturbation")
         tables = (
             study.fitted,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from geomech import scenes
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from rft import CATALOGUE
 
 pytestmark = pytest.mark.usefixtures("fastest")
@@ -35,7 +35,10 @@ PINNED = {
 
 @pytest.mark.parametrize("name", scenes.builtin_names())
 def test_displacement_is_pinned(name):
-    found, wanted = Study(scenes.load(name)).poses("direct"), np.array(PINNED[name])
+    found, wanted = (
+        SceneTables(scenes.load(name)).poses("direct"),
+        np.array(PINNED[name]),
+    )
     # Where drag builds up, 64 phases and pieces of 1 / 100 leave some 1e-3, whose digits are the scheme's.
     fine = 5e-4 if name == "sandfish-transient" else 2e-5
     np.testing.assert_allclose(found, wanted, atol=fine * np.abs(wanted).max())

@@ -13,7 +13,7 @@ from geomech import scenes
 from geomech.core.errors import Note, UnitWarning
 from geomech.gaits import Centreline, Sine
 from geomech.gaits.waves import arc_to_phase
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.studies.sweep import sweep
 from rft import Backbone
 from rft.core.refusal import Refusal
@@ -120,14 +120,16 @@ def sandfish():
     made = full.changed(
         body=Backbone(ELEMENTS), gait=Sine(amplitude=0.2, elements=ELEMENTS)
     )
-    return made, Study(made).poses("direct")
+    return made, SceneTables(made).poses("direct")
 
 
 @pytest.mark.parametrize("kind", HEADERS)
 def test_displacement_is_that_of_the_sine(kind, sandfish, tmp_path):
     made, exact = sandfish
     measured = gait(write(tmp_path, kind, count=64, places=80, amplitude=0.2))
-    np.testing.assert_allclose(Study(made).poses("direct", measured), exact, atol=1e-5)
+    np.testing.assert_allclose(
+        SceneTables(made).poses("direct", measured), exact, atol=1e-5
+    )
     assert exact[0] > 0.3
 
 
@@ -151,7 +153,7 @@ def test_smoothing_recovers_the_displacement(kind, noise, sandfish, tmp_path):
 
     def error(**options):
         poses = np.array(
-            [Study(made).poses("direct", gait(path, **options)) for path in paths]
+            [SceneTables(made).poses("direct", gait(path, **options)) for path in paths]
         )
         return np.sqrt(np.mean((poses - exact)[:, :2] ** 2) * 2)
 
@@ -354,7 +356,7 @@ def test_file_lies_beside_the_scene(tmp_path, monkeypatch):
     )
     assert (code, err) == (0, "")
     made = scenes.load(toml)
-    sine = Study(made).poses("direct", Sine(amplitude=0.1, elements=ELEMENTS))
+    sine = SceneTables(made).poses("direct", Sine(amplitude=0.1, elements=ELEMENTS))
     rows = [line.split() for line in out.splitlines()]
     (x,) = (row[1] for row in rows if row[:1] == ["1"])
     assert float(x) == pytest.approx(sine[0], abs=5e-5)  # its last digit
@@ -580,7 +582,7 @@ def test_what_an_estimate_leaves_out_is_told(tmp_path):
             if more
             else f" estimated error: {said} " in " ".join(told.split())
         )
-    measured = Study(scenes.load(toml))
+    measured = SceneTables(scenes.load(toml))
     swept = lambda scene: sweep(scene, {"gait.amplitude": [1.0]}).attributes
     assert (
         measured.displacements([1.0], ["direct"]).to_xarray().attrs["error_is"] == said

@@ -21,7 +21,7 @@ from geomech.io import files
 from geomech.questions import run
 from geomech.results.files import load
 from geomech.studies.report import compared, reachable, steps, tables_of
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from rft.core.refusal import Refusal
 
 SMALL = ["--grid", "9"]
@@ -89,7 +89,7 @@ def test_connection_is_a_self_describing_file(tmp_path):
         assert all(
             "units" in data[v].attrs for v in ("A", "ccf", "fit_residual", "alpha_1")
         )
-        again = Study(
+        again = SceneTables(
             scenes.parse(data.attrs["scene_toml"]).with_numerics(grid=9, extent=2.0)
         ).fitted
         np.testing.assert_array_equal(data.A, again.A)
@@ -199,7 +199,7 @@ def test_run_leaves_everything(undrawn, tmp_path):
         run = {"circle": glass.gait, "butterfly": scenes.load("butterfly-glass").gait}[
             gait
         ]
-        wanted = Study(glass).poses("direct", run, np.array(table["amplitude"]))
+        wanted = SceneTables(glass).poses("direct", run, np.array(table["amplitude"]))
         np.testing.assert_allclose(table["direct"], wanted, atol=1e-9)
         assert f"{wanted[-1, 0]:.9f}"[:6] in out
         assert ("note" in result.attributes) == (gait == "butterfly")

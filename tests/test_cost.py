@@ -18,7 +18,7 @@ from geomech.geometry import connection, harmonics
 from geomech.geometry.field import Field
 from geomech.run import cost as run_cost
 from geomech.studies import cycles, estimate, sweep
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 
 GLASS = scenes.load("three-link-glass")
 VISCOUS = scenes.load("three-link-viscous")
@@ -218,7 +218,7 @@ def test_pieces_change_no_numbers(monkeypatch):
     amplitudes = np.linspace(0.3, 1.4, 4)
 
     def everything():
-        fresh = Study(scene.with_numerics(grid=7))
+        fresh = SceneTables(scene.with_numerics(grid=7))
         tiers = [
             fresh.poses(m, None, amplitudes)
             for m in ("area", "adapted", "path", "harmonic", "direct")
@@ -229,7 +229,7 @@ def test_pieces_change_no_numbers(monkeypatch):
             fresh.fitted.speed,
             fresh.table("harmonic").residual,
         )
-        marched = Study(SLOPING.with_numerics(phases=16, cycles=2)).poses(
+        marched = SceneTables(SLOPING.with_numerics(phases=16, cycles=2)).poses(
             "direct", None, amplitudes / 5
         )
         return [

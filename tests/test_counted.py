@@ -15,7 +15,7 @@ from geomech.questions.ccf import Ccf
 from geomech.questions.run import Run
 from geomech.run.cost import BASE
 from geomech.studies import cost, effort, motion, sweep
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.tiers import TIERS
 from rft import Chain, body_velocity
 from rft.balance.listening import listening
@@ -54,7 +54,7 @@ FIFTH = Fourier(
 )
 UNSURE = dataclasses.replace(GLASS.system.medium, covariance=((0.01, 0.0), (0.0, 4e-4)))
 FRAMED = (
-    Study(GLASS.with_numerics(grid=7).changed(medium=UNSURE))
+    SceneTables(GLASS.with_numerics(grid=7).changed(medium=UNSURE))
     .in_frame("minimum-perturbation")
     .scene
 )
@@ -81,7 +81,7 @@ FOUND = {
     "pieces": (SKIN, ("area", "path", "harmonic", "direct")),
     "a backbone": (SNAKE, ("direct",)),
     "a frame": (
-        Study(GLASS.with_numerics(grid=9)).in_frame("minimum-perturbation").scene,
+        SceneTables(GLASS.with_numerics(grid=9)).in_frame("minimum-perturbation").scene,
         ("harmonic", "direct"),
     ),
     "a frame in sand that is not known": (FRAMED, ("direct",)),
@@ -96,8 +96,8 @@ FOUND = {
 @pytest.mark.parametrize("name", FOUND)
 def test_the_balances_foretold_are_those_solved(name, solved):
     scene, tiers = FOUND[name]
-    foretold = Study(scene).cost([0.1, 0.2, 0.3], tiers).balances
-    tabled(Study(scene).displacements([0.1, 0.2, 0.3], tiers))
+    foretold = SceneTables(scene).cost([0.1, 0.2, 0.3], tiers).balances
+    tabled(SceneTables(scene).displacements([0.1, 0.2, 0.3], tiers))
     assert foretold == sum(solved)
 
 
@@ -139,7 +139,7 @@ TABLES = {
 @pytest.mark.parametrize("scene", [GLASS, VISCOUS, SKIN])
 def test_a_table_takes_the_balances_foretold(scene, grid, name, solved):
     scene, (jobs, compute) = scene.with_numerics(grid=grid), TABLES[name]
-    study = Study(scene)
+    study = SceneTables(scene)
     if name == "even part":
         study.compute_field()  # on whose grid it is
     if name == "metric" and effort.why_none(scene.system):
@@ -211,7 +211,7 @@ def test_memory_is_foretold_too_large_rather_than_too_small():
     told = cost.direct(scene, scene.gait, len(amplitudes), 4096)[0].memory - BASE
     tracemalloc.start()
     try:
-        tabled(Study(scene).displacements(amplitudes, ["direct"]))
+        tabled(SceneTables(scene).displacements(amplitudes, ["direct"]))
         used = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()

@@ -14,14 +14,14 @@ from geomech.geometry.field import Field
 from geomech.questions.ccf import zero_line_words
 from geomech.results import show
 from geomech.studies import fields
+from geomech.studies.scene_tables import SceneTables
 from geomech.studies.shape_space import zero_line
-from geomech.studies.study import Study
 from geomech.tiers import fitted
 from rft.formulas import se2
 
 pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = scenes.load("three-link-glass")
-BENCH = Study(GLASS)
+BENCH = SceneTables(GLASS)
 
 
 def local(scene, shapes, h=2e-4):
@@ -81,7 +81,7 @@ def test_the_error_of_the_ccf_covers_the_truth(name, numerics, least, most):
     """At random grid points, each component, in a share of ``least``; and in the median by no more than ``most`` errors."""
     scene, rng = scenes.load(name).with_numerics(**numerics), np.random.default_rng(4)
     i, j = rng.integers(0, scene.numerics.grid, (2, 300))
-    study = Study(scene)
+    study = SceneTables(scene)
     axes = study.fitted.axes
     truth = local(scene, np.stack([axes[0][i], axes[1][j]], -1)).T
     estimate = study.curvature_error.values[:, i, j]
@@ -109,8 +109,8 @@ def test_wrong_signs_near_kinks_are_known_to_be_unknown():
 
 def test_the_smallest_grid_has_an_error_too():
     small = GLASS.with_numerics(grid=4)
-    assert np.isfinite(Study(small).curvature_error.values).all()
-    assert Study(small).curvature_error.values.max() > 0.01
+    assert np.isfinite(SceneTables(small).curvature_error.values).all()
+    assert SceneTables(small).curvature_error.values.max() > 0.01
 
 
 @pytest.mark.parametrize(("length", "unit"), [(None, "BL"), (0.4, "m")])
@@ -122,7 +122,7 @@ def test_files_have_values_units_and_conventions(tmp_path, length, unit):
     scene = GLASS.changed(body=body).with_numerics(
         grid=7, extent=2.0, regularisation=1e-5
     )
-    study = Study(scene)
+    study = SceneTables(scene)
     fields.save_connection(tmp_path / "a.nc", study)
     per = f"{unit}/rad, {unit}/rad, rad/rad"
     per2 = f"{unit}/rad2, {unit}/rad2, rad/rad2"

@@ -11,7 +11,7 @@ from geomech import scenes
 from geomech.questions.sweep import Sweep
 from geomech.run import cost as run_cost
 from geomech.run import runner as runners
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from rft.balance.backend import preferring
 from rft.balance.listening import listener, listening, no_listener
 from rft.core.refusal import Refusal
@@ -119,7 +119,7 @@ def test_what_is_decided_next_is_not_told_by_what_was_to_be_before(clock):
 def test_a_step_of_time_weighs_as_much_as_many_balances_of_a_batch():
     """As NumPy takes a batch's time for it; for the choice of the back end alone."""
     marched = scenes.load("sandfish-transient")
-    found = Study(marched).cost([0.2], ["direct"])
+    found = SceneTables(marched).cost([0.2], ["direct"])
     assert (
         found.steps > 500
         and found.as_balances
@@ -127,7 +127,9 @@ def test_a_step_of_time_weighs_as_much_as_many_balances_of_a_batch():
         > 100_000
         > found.balances
     )
-    assert Study(scenes.load("three-link-glass")).cost([0.2], ["direct"]).steps == 0
+    assert (
+        SceneTables(scenes.load("three-link-glass")).cost([0.2], ["direct"]).steps == 0
+    )
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from geomech import scenes
 from geomech.optimisation import build_request
 from geomech.run.digest import Undigestible, digest
 from geomech.studies.effort import _Driven
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems.solver import Solver
 
 VISCOUS = scenes.load("three-link-viscous")
@@ -150,7 +150,7 @@ def test_what_an_object_remembers_is_no_part_of_it():
     request = build_request(VISCOUS, "displacement")
     before = digest(request)
     assert request.degree == 2.0 and digest(request) == before
-    study = Study(VISCOUS).in_frame("minimum-perturbation")
+    study = SceneTables(VISCOUS).in_frame("minimum-perturbation")
     before = digest(study.scene)
     study.compute_field()
     assert digest(study.scene) == before

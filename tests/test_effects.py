@@ -15,7 +15,7 @@ from geomech.core.errors import UnitWarning
 from geomech.describe.explain import explained
 from geomech.gaits import Circle, Ellipse, Sine
 from geomech.studies.available import default_tiers
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems import Swimmer
 from rft import (
     CATALOGUE,
@@ -546,9 +546,9 @@ INERTIAL = (
 
 def test_with_grain_inertia_frequency_matters():
     slow, fast = (scenes.parse(INERTIAL.format(f=f)) for f in (0.01, 3.0))
-    plain = Study(scenes.load("three-link-glass")).poses("direct")
-    np.testing.assert_allclose(Study(slow).poses("direct"), plain, atol=1e-4)
-    assert np.abs(Study(fast).poses("direct") - plain).max() > 5e-3
+    plain = SceneTables(scenes.load("three-link-glass")).poses("direct")
+    np.testing.assert_allclose(SceneTables(slow).poses("direct"), plain, atol=1e-4)
+    assert np.abs(SceneTables(fast).poses("direct") - plain).max() > 5e-3
     alpha, alphadot = fast.gait.cycle(16)
     twice = fast.system.velocity(alpha, 2 * alphadot) / 2
     assert (
@@ -563,11 +563,13 @@ def test_what_an_effect_breaks_is_refused_by_name(tier):
     with pytest.raises(
         Refusal, match="the effect grain-inertia, which is not rate-independent"
     ):
-        Study(inertial).poses(tier)
+        SceneTables(inertial).poses(tier)
     assert "; not rate-independent; costs" in explained(inertial)
     assert "not available: connection, CCF" in explained(inertial)
     np.testing.assert_allclose(
-        Study(inertial).poses("adapted"), Study(inertial).poses("direct"), atol=1e-3
+        SceneTables(inertial).poses("adapted"),
+        SceneTables(inertial).poses("direct"),
+        atol=1e-3,
     )
 
 
@@ -611,7 +613,7 @@ def test_a_body_that_comes_to_the_surface_is_refused():
         + '[[effects]]\nkind = "depth-profile"\nslope = 10.0\n'
     )
     with pytest.raises(ValueError, match="comes to the surface: lower the slope"):
-        Study(scenes.parse(text)).poses("direct")
+        SceneTables(scenes.parse(text)).poses("direct")
 
 
 PAST = {
@@ -627,13 +629,13 @@ def test_what_a_march_cannot_give_is_refused_by_name(name):
     swimmer = scenes.parse(
         f'{scenes.load("three-link-glass").text}\n[[effects]]\nkind = "{name}"\n{PAST[name]}\n'
     )
-    assert Study(swimmer).tiers == default_tiers(swimmer.system) == ("direct",)
+    assert SceneTables(swimmer).tiers == default_tiers(swimmer.system) == ("direct",)
     for asked in (
-        lambda: Study(swimmer).poses("area"),
-        lambda: Study(swimmer).poses("path"),
-        lambda: Study(swimmer).poses("harmonic"),
-        lambda: Study(swimmer).poses("adapted"),
-        lambda: Study(swimmer).fitted,
+        lambda: SceneTables(swimmer).poses("area"),
+        lambda: SceneTables(swimmer).poses("path"),
+        lambda: SceneTables(swimmer).poses("harmonic"),
+        lambda: SceneTables(swimmer).poses("adapted"),
+        lambda: SceneTables(swimmer).fitted,
         lambda: swimmer.system.velocity([0.1, 0.2], [1.0, 0.0]),
     ):
         with pytest.raises(

@@ -11,7 +11,7 @@ from geomech.geometry.connection import Connection
 from geomech.io.results import to_xarray
 from geomech.scenes.frames import framed
 from geomech.studies import cost, effort, fields
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems import NoSlipSnake, Swimmer, Table
 from geomech.systems.capabilities import (
     refined,
@@ -44,7 +44,7 @@ def scene(system, gait=GAIT):
 
 @pytest.mark.parametrize("medium", [FLUID, SAND])
 def test_table_and_gait_agree_and_do_not_see_size_or_frame(medium):
-    study = Study(scene(Swimmer(medium, UNEVEN)))
+    study = SceneTables(scene(Swimmer(medium, UNEVEN)))
     found = study.effort(amplitudes=[0.5, 1.2])
     looked_up = metric.path_length(study.metric.norm, GAIT, [0.5, 1.2])
     assert looked_up == pytest.approx(
@@ -54,7 +54,7 @@ def test_table_and_gait_agree_and_do_not_see_size_or_frame(medium):
         Chain((0.7, 1.4, 0.9)),
         Chain((0.7, 1.4, 0.9), length=0.3, frame="link-2"),
     ):
-        again = Study(scene(Swimmer(medium, other))).effort(amplitudes=[0.5, 1.2])
+        again = SceneTables(scene(Swimmer(medium, other))).effort(amplitudes=[0.5, 1.2])
         for key in ("path_length", "work"):
             assert again[key] == pytest.approx(found[key], rel=1e-9)
 
@@ -73,7 +73,7 @@ def test_power_is_that_of_every_frame(medium):
 
 
 def test_a_norm_shares_the_velocities_of_the_harmonics():
-    study, calls = Study(scene(Swimmer(SAND, UNEVEN))), []
+    study, calls = SceneTables(scene(Swimmer(SAND, UNEVEN))), []
     whole = Swimmer.velocity
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
@@ -87,7 +87,7 @@ def test_a_norm_shares_the_velocities_of_the_harmonics():
         before = sum(calls)
         table = study.table("harmonic")
         assert sum(calls) == before
-    alone = Study(study.scene)
+    alone = SceneTables(study.scene)
     assert np.array_equal(alone.table("harmonic").coefficients, table.coefficients)
     assert (
         np.abs(alone.metric.coefficients - norm.coefficients).max()
@@ -100,12 +100,14 @@ def test_a_norm_shares_the_velocities_of_the_harmonics():
 
 def test_work_and_cost_of_transport_of_known_motions():
     """Viscous: work over that of towing is path length^2 at best over distance^2, with equality at constant power."""
-    found = Study(scene(Swimmer(FLUID, Chain()), Circle())).effort(amplitudes=[0.05])
+    found = SceneTables(scene(Swimmer(FLUID, Chain()), Circle())).effort(
+        amplitudes=[0.05]
+    )
     assert found["work"] * 2 * np.pi == pytest.approx(
         found["path_length"] ** 2, rel=0.1
     )
     assert found["work"] * 2 * np.pi >= found["path_length"] ** 2
-    study = Study(scene(Swimmer(SAND, UNEVEN)))
+    study = SceneTables(scene(Swimmer(SAND, UNEVEN)))
     result = study.displacements([0.5, 1.0], ["direct", "path"])
     result = effort.with_effort(result, study.scene)
     table = tabled(result)
@@ -122,7 +124,7 @@ def test_work_and_cost_of_transport_of_known_motions():
 
 
 def test_viscous_circle_is_as_efficient_as_published():
-    study = Study(scene(Swimmer(Viscous(2.0), Chain()), Circle()))
+    study = SceneTables(scene(Swimmer(Viscous(2.0), Chain()), Circle()))
     result = study.displacements([1.0, 1.3], ["direct"])
     table = tabled(effort.with_effort(result, study.scene))
     assert table["path_length"][0] == pytest.approx(0.512235, abs=1e-6)
@@ -184,7 +186,7 @@ def test_what_has_no_metric_says_why(system, said):
         if system.joints == 2
         else geomech.gaits.Fourier(cos=((1,), (0,), (0,)), sin=((0,), (1,), (0.5,)))
     )
-    study = Study(scene(system, gait))
+    study = SceneTables(scene(system, gait))
     with pytest.raises(Refusal, match=said):
         study.metric  # noqa: B018
 
@@ -207,7 +209,7 @@ def test_gaits_with_a_past_cost_work_all_the_same():
 
 @pytest.mark.parametrize("medium", [FLUID, SAND])
 def test_the_file_has_what_a_change_of_shape_costs(medium, tmp_path):
-    study = Study(scene(Swimmer(medium, UNEVEN)))
+    study = SceneTables(scene(Swimmer(medium, UNEVEN)))
     fields.save_connection(tmp_path / "made.nc", study)
     assert np.array_equal(Connection.load(tmp_path / "made.nc").A, study.fitted.A)
     table = Table(str(tmp_path / "made.nc"))
@@ -216,7 +218,7 @@ def test_the_file_has_what_a_change_of_shape_costs(medium, tmp_path):
     assert np.array_equal(
         getattr(back, name), getattr(own, name)
     ) and table.traits.power_degree == (2 if medium is FLUID else 1)
-    again = Study(scene(table)).effort(amplitudes=[1.0])
+    again = SceneTables(scene(table)).effort(amplitudes=[1.0])
     there = study.effort(amplitudes=[1.0])
     assert again["path_length"] == pytest.approx(there["path_length"], rel=3e-3)
     assert again["work"] == pytest.approx(there["work"], rel=5e-3)
@@ -228,7 +230,7 @@ def test_the_file_has_what_a_change_of_shape_costs(medium, tmp_path):
 def test_a_damaged_metric_is_refused(tmp_path):
     from scipy.io import netcdf_file
 
-    study = Study(scene(Swimmer(FLUID, UNEVEN)))
+    study = SceneTables(scene(Swimmer(FLUID, UNEVEN)))
     for what in ("symmetry", "degree"):
         path = tmp_path / f"{what}.nc"
         fields.save_connection(path, study)
@@ -252,7 +254,7 @@ def test_what_it_takes_is_foretold(medium, body):
     foretold = cost.price(cost.of_metric(one)).balances
     assert effort.why_none(one.system) == ""  # which is asked for once
     with listening(lambda samples, points, linear: counts.append(samples)):
-        Study(one).metric  # noqa: B018
+        SceneTables(one).metric  # noqa: B018
     assert sum(counts) == foretold
 
 
@@ -290,7 +292,7 @@ def test_by_command(capsys):
 def test_a_metric_of_the_systems_own_has_lengths_and_no_work(name, capsys):
     from geomech.cli import main
 
-    study = Study(geomech.load(name).with_numerics(grid=31, extent=2.5))
+    study = SceneTables(geomech.load(name).with_numerics(grid=31, extent=2.5))
     alpha, alphadot = study.scene.gait.cycle(256, 0.8)
     length = (
         2 * np.pi * np.sqrt(study.scene.system.squared_speed(alpha, alphadot)).mean()

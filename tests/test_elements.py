@@ -11,7 +11,7 @@ from geomech.scenes.model import Scene
 from geomech.studies import estimate
 from geomech.studies.choose import cheapest
 from geomech.studies.effort import effort
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems import Swimmer
 from geomech.systems.swimmer import MEDIA
 from rft.bodies import Backbone, ConstantCurvature, Positions, Serpenoid
@@ -83,7 +83,7 @@ def test_errors_of_all_tiers_contain_it():
     coarse, fine = (Scene(Swimmer(FLUID, Serpenoid(elements=n)), Circle(2.0))
                     for n in (12, FINE))  # fmt: skip
     (true,), _ = estimate.direct(fine, fine.gait, np.array([2.0]), 64)
-    tables = Study(coarse.with_numerics(grid=9, phases=64))
+    tables = SceneTables(coarse.with_numerics(grid=9, phases=64))
     found = tables.displacements([2.0], ["area", "path", "direct"])
     for k in range(3):
         net = [found[name].values[k, 0] for name in ("x", "y", "heading")]

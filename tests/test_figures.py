@@ -24,7 +24,7 @@ from figures import (
     style,
 )
 from geomech.scenes import load
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from rft import CATALOGUE, Granular
 
 pytestmark = pytest.mark.usefixtures("fastest")
@@ -93,7 +93,7 @@ def test_fig11c(tmp_path):
 def test_the_misfit_of_the_plane_in_loose_glass(tmp_path):
     """26 to 33 % rms of each component in the middle-link frame."""
     glass = load("three-link-glass").with_numerics(directions=24)
-    fitted = Study(
+    fitted = SceneTables(
         glass.changed(body=dataclasses.replace(glass.system.body, frame="link-2"))
     ).fitted
     misfit = np.sqrt((fitted.residual**2).mean((1, 2)) / (fitted.speed**2).mean((1, 2)))
@@ -110,12 +110,12 @@ def test_fig11d(tmp_path):
     # Left and right are alike, and the field is computed by half: here every shape of a smaller one is solved.
     lopsided = type("Lopsided", (Granular,), {"mirror": False})
     small = load("three-link-glass").with_numerics(grid=8, extent=2.0)
-    whole = Study(
+    whole = SceneTables(
         small.changed(
             medium=lopsided(small.system.medium.C, small.system.medium.gamma0)
         )
     ).curvature.values
-    np.testing.assert_allclose(whole, Study(small).curvature.values, atol=1e-6)
+    np.testing.assert_allclose(whole, SceneTables(small).curvature.values, atol=1e-6)
     np.testing.assert_allclose(
         whole[:, ::-1, ::-1], whole * np.array([1, -1, -1])[:, None, None], atol=1e-6
     )

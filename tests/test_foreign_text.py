@@ -19,7 +19,7 @@ from geomech.io.tables.mat import ABOUT
 from geomech.run import progress
 from geomech.scenes import Numerics, Scene
 from geomech.studies import fields
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from rft.core import refusal as errors
 
 ESC = "\x1b]0;owned\x07\x1b[2J\x9b31m\u202e\r"  # sets a title, rings, clears, in red, backwards, over what stood there
@@ -59,7 +59,7 @@ def test_plain_text_stays_what_it_is():
 def stored(tmp_path_factory):
     """A folder with a.nc and a.mat of a small table."""
     folder = tmp_path_factory.mktemp("tables")
-    bench = Study(scenes.load("three-link-viscous").with_numerics(grid=7))
+    bench = SceneTables(scenes.load("three-link-viscous").with_numerics(grid=7))
     fields.save_connection(folder / "a.nc", bench)
     fields.save_connection(folder / "a.mat", bench)
     return folder
@@ -228,7 +228,9 @@ def test_what_is_kept_of_a_request(geomech, tmp_path):
 
 def test_pages_of_a_notebook():
     scene = scenes.load("three-link-viscous")
-    made = Study(Scene(scene.system, scene.gait, Numerics(grid=7), name=f"<b>{ESC}"))
+    made = SceneTables(
+        Scene(scene.system, scene.gait, Numerics(grid=7), name=f"<b>{ESC}")
+    )
     found = made.displacements([0.5], ["direct"])
     swept = package.sweep(made.scene, {"gait.amplitude": [0.5, 1.0]})
     for page in (
@@ -276,7 +278,7 @@ def test_messages_are_no_longer_than_may_be_read(geomech, tmp_path, monkeypatch)
     def fails(*_, **__):
         raise ValueError(LONG)
 
-    monkeypatch.setattr(Study, "displacements", fails)
+    monkeypatch.setattr(SceneTables, "displacements", fails)
     code, out, err = geomech(
         "displacement", "three-link-viscous", "--amplitudes", "0.5"
     )

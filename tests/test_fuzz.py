@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from geomech import scenes
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 
 pytestmark = [
     pytest.mark.usefixtures("fastest"),
@@ -101,7 +101,7 @@ def outcome(text):
         )
         assert (solution.status != "unconverged").all()
         assert np.isfinite(solution.xi).all()
-        assert np.isfinite(Study(read).poses("direct")).all()
+        assert np.isfinite(SceneTables(read).poses("direct")).all()
         return "run"
     except ValueError as error:
         message = str(error)

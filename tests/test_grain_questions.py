@@ -319,9 +319,9 @@ def test_a_swim_stands_beside_the_tiers(monkeypatch, tmp_path):
     np.testing.assert_allclose(result["cycle_y"].values, 0.08 * np.sin(0.1), rtol=1e-3)
     assert float(result["work"]) == pytest.approx(0.25)
     k = result["method"].values.tolist().index("direct")
-    from geomech.studies.study import Study
+    from geomech.studies.scene_tables import SceneTables
 
-    own = tabled(Study(scene).displacements([0.9], ("direct",)))
+    own = tabled(SceneTables(scene).displacements([0.9], ("direct",)))
     assert result["x"].values[k] == pytest.approx(own["x"]["direct"][0] / 0.3)
     assert not np.isclose(result["x"].values[k], result["x"].values[k + 1])
     # Ends that both push half as much are one end that pushes, to 1 %.
@@ -331,7 +331,7 @@ def test_a_swim_stands_beside_the_tiers(monkeypatch, tmp_path):
     ).in_metres(0.3)
     ahead = dataclasses.replace(scene.system, medium=flank.medium, effects=(one,))
     one_end = tabled(
-        Study(scene.changed(system=ahead)).displacements([0.9], ("direct",))
+        SceneTables(scene.changed(system=ahead)).displacements([0.9], ("direct",))
     )
     assert result["x"].values[k + 1] == pytest.approx(
         one_end["x"]["direct"][0] / 0.3, rel=0.03

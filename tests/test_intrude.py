@@ -17,8 +17,8 @@ from geomech.core.setting import Setting
 from geomech.scenes.intruder import IntruderScene
 from geomech.studies import intrusion
 from geomech.studies.intrusion import Settings, answer, estimate
+from geomech.studies.scene_tables import SceneTables
 from geomech.studies.settings import Measured
-from geomech.studies.study import Study
 from rft.core.refusal import Refusal
 from rft.terradynamics.plates import (
     VERTICAL,
@@ -537,7 +537,7 @@ def test_scenes_of_the_other_kind_are_refused_with_the_command_for_them(geomech)
     with pytest.raises(
         ValueError, match="a study is that of a Scene, got IntruderScene"
     ):
-        Study(scenes.load("c-leg"))
+        SceneTables(scenes.load("c-leg"))
 
 
 def test_options_of_stress_and_intrude_are_refused_before_anything_is_written(

@@ -28,7 +28,7 @@ from geomech.scenes.keys import text
 from geomech.scenes.kinds import load_file, register
 from geomech.scenes.schema import schema
 from geomech.studies import estimate
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems import Premise, Solver, Swimmer, capability
 from geomech.systems.capabilities import Recorded
 from rft import Backbone, Chain, Coulomb, EndCaps, Granular, Viscous, body_velocity
@@ -136,7 +136,7 @@ def test_a_law_of_traction_alone_gives_every_tier_within_its_error(law):
         np.array([0.5, 0.9]),
     )
     exact, bare = (
-        Study(Scene(Swimmer(x, body), gait, SMALL)) for x in (law, Bare(law))
+        SceneTables(Scene(Swimmer(x, body), gait, SMALL)) for x in (law, Bare(law))
     )
     finer = bare.with_numerics(loads="gauss:96")  # leaves a quarter
     for tier in ("area", "direct"):
@@ -204,7 +204,7 @@ def test_the_speed_matters_under_a_law_of_no_one_power():
             ValueError,
             match="no connection or CCF with the law .*no one power of the speed: use the direct tier, or take another law",
         ):
-            Study(Scene(swimmer, Circle(), SMALL)).poses("path")
+            SceneTables(Scene(swimmer, Circle(), SMALL)).poses("path")
     for law in (
         Viscous(),
         Coulomb(),
@@ -323,7 +323,7 @@ def test_one_of_each_family_runs_everywhere_and_round_trips(name):
     assert f'"{name}"' in anew
     assert toml(parse(anew)) == anew
     assert name in explained(scene)
-    study = Study(scene)
+    study = SceneTables(scene)
     table = tabled(study.displacements([0.4, 0.7]))
     assert np.isfinite(table["direct"]).all()
     with pytest.raises(ValueError, match="car|hinge|peanut|slick"):
@@ -697,7 +697,7 @@ def test_parts_are_values_and_need_not_be_registered_from_python():
     with pytest.raises(ValueError, match="frozen"):
         Scene(Swimmer(Loose(Viscous()), Chain()), Circle())
     scene = Scene(Swimmer(Bare(Viscous(math.e)), Chain()), Circle(), SMALL)
-    assert Study(scene).poses("area").shape == (3,)
+    assert SceneTables(scene).poses("area").shape == (3,)
     with pytest.raises(Refusal, match="Bare is of no kind that a scene file can name"):
         toml(scene)
     assert set(GAITS) == GAITS.built_in

@@ -25,7 +25,7 @@ from geomech.gaits import Butterfly, Circle, Points
 from geomech.scenes.write import text_of, without_gait
 from geomech.studies import charts
 from geomech.studies.lab import GALLERY, Lab
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
 from rft.core.refusal import Refusal
 
@@ -54,7 +54,7 @@ def glass():
 )
 def test_tiers_are_those_of_the_study(name):
     scene = scenes.load(name).with_numerics(grid=15)
-    study, found = Study(scene), charts.tiers(charts.chart(scene), OFF_CENTRE)
+    study, found = SceneTables(scene), charts.tiers(charts.chart(scene), OFF_CENTRE)
     for tier, (net, _) in found.items():
         near = (
             2e-6 if scene.system.traits.linear else 1e-7
@@ -64,7 +64,7 @@ def test_tiers_are_those_of_the_study(name):
 
 def test_tiers_in_the_minimum_perturbation_frame(glass):
     study, found = (
-        Study(glass.scene).in_frame(MINIMUM_PERTURBATION),
+        SceneTables(glass.scene).in_frame(MINIMUM_PERTURBATION),
         charts.tiers(glass, OFF_CENTRE, MINIMUM_PERTURBATION),
     )
     for tier, near in (
@@ -83,7 +83,7 @@ def test_tiers_in_the_minimum_perturbation_frame(glass):
 def test_errors_hold_and_are_not_idle(name):
     """Against the force balance, for loops other than those by which the grid's error is measured."""
     scene = scenes.load(name)
-    chart, study, held, ratios = charts.chart(scene), Study(scene), [], []
+    chart, study, held, ratios = charts.chart(scene), SceneTables(scene), [], []
     for gait in charts.loops(chart.axes, 40, seed=11):
         found, truth = charts.tiers(chart, gait), study.poses("direct", gait)
         off = {
@@ -100,7 +100,7 @@ def test_errors_hold_and_are_not_idle(name):
 
 def test_harmonics_that_are_next_to_nothing_are_left_out(monkeypatch):
     monkeypatch.setattr(charts, "SMALL", 0.05)
-    series = Study(
+    series = SceneTables(
         scenes.load("three-link-glass").with_numerics(grid=9)
     ).compute_harmonics()
     size = np.abs(series.coefficients).max((0, 2, 3)).reshape(-1, 2).max(-1)

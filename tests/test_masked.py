@@ -7,7 +7,7 @@ import geomech
 import rft
 from geomech.gaits import GAITS
 from geomech.geometry import connection, coordinates, curvature, reconstruct
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems import SYSTEMS, as_system
 from rft.core.refusal import Refusal
 from rft.formulas import se2
@@ -46,9 +46,9 @@ CALLS = {
     "poses": lambda: reconstruct.poses(POSES),
     "displacement": lambda: reconstruct.displacement(POSES),
     "frame of a velocity": lambda: coordinates.change_velocity(POSES, POSES, POSES),
-    "amplitudes": lambda: Study(STUDY).displacements(ANGLES),
+    "amplitudes": lambda: SceneTables(STUDY).displacements(ANGLES),
     "cycle": lambda: STUDY.cycle(amplitudes=ANGLES),
-    "poses of a tier": lambda: Study(STUDY).poses("direct", amplitudes=ANGLES),
+    "poses of a tier": lambda: SceneTables(STUDY).poses("direct", amplitudes=ANGLES),
     "data": lambda: rod_drag(ANGLES, [1.0, 1.0], [1.0, 1.0]),
     "stress": lambda: plates.StressMap()(ANGLES, 0.5),
     "poses of a plate": lambda: plates.loads(plates.StressMap(), plates.Plate(0.1, 0.1), POSES, POSES),

@@ -50,8 +50,8 @@ from geomech.optimisation import optimise
 from geomech.results.measured import scene_text
 from geomech.scenes import Scene, load
 from geomech.studies import fields
+from geomech.studies.scene_tables import SceneTables
 from geomech.studies.single import single
-from geomech.studies.study import Study
 from geomech.systems import Swimmer, Table
 from geomech.systems.base import length_unit
 from geomech.systems.capabilities import stored_table, table_error
@@ -550,7 +550,7 @@ def test_three_joints(tmp_path):
     np.testing.assert_allclose(
         system.run(*f.gait.cycle(128)).net, f.displacement[0], rtol=1e-12
     )
-    study, there = Study(Scene(system, f.gait)), f.known.loop.shape(np.array(0.0))
+    study, there = SceneTables(Scene(system, f.gait)), f.known.loop.shape(np.array(0.0))
     plane = study.plane((0, 2), there)
     alpha = np.broadcast_to(there, (*plane.connection.A.shape[2:], 3)).copy()
     alpha[..., 0], alpha[..., 2] = np.meshgrid(*plane.connection.axes, indexing="ij")
@@ -845,7 +845,7 @@ def test_a_field_is_read_back_as_a_system(usual, field):
     np.testing.assert_allclose(scene.gait.cycle(64), usual.gait.cycle(64), atol=1e-12)
     assert math.isclose(scene.frequency, usual.frequency)
     net, off = usual.displacement
-    study = Study(scene)
+    study = SceneTables(scene)
     np.testing.assert_allclose(
         study.poses("direct", amplitudes=[1.0])[0], net, rtol=1e-10
     )
@@ -860,7 +860,7 @@ def test_a_field_is_read_back_as_a_system(usual, field):
 
 def test_what_the_data_do_not_reach_is_refused(field):
     scene = load(field / "mine.toml")
-    system, study = scene.system, Study(scene)
+    system, study = scene.system, SceneTables(scene)
     with pytest.raises(
         ValueError, match=r"the data do not reach alpha = \(0.2, -0.1\), \d"
     ):
@@ -916,7 +916,7 @@ def test_a_field_written_before_it_had_what_is_left_is_read(field, tmp_path):
 
 
 def test_a_field_written_again_keeps_every_digit(field, tmp_path):
-    study = Study(load(field / "mine.toml"))
+    study = SceneTables(load(field / "mine.toml"))
     fields.save_connection(tmp_path / "again.nc", study)
     one, other = (
         Connection.load(x).taylor for x in (field / "field.nc", tmp_path / "again.nc")
@@ -946,7 +946,7 @@ def test_a_field_written_again_keeps_every_digit(field, tmp_path):
 @pytest.mark.parametrize(("sign", "order"), [("+", "ndgrid"), ("-", "meshgrid")])
 def test_errors_of_A_go_with_it_into_a_mat_file(field, tmp_path, sign, order):
     """Nan where A is, which leaves nothing to look up."""
-    study = Study(load(field / "mine.toml"))
+    study = SceneTables(load(field / "mine.toml"))
     fields.save_connection(tmp_path / "a.mat", study, sign=sign, order=order)
     first = xarray.open_dataset(field / "field.nc", engine="scipy")
     error = loadmat(tmp_path / "a.mat")[ERROR]
@@ -1003,7 +1003,7 @@ def test_a_tube_between_the_points_of_its_grid_is_looked_up_all_the_same(
 ):
     thin = measured.fit_log(usual.log, limits=1e-5, harmonics=4)
     save_field(tmp_path / "thin.nc", thin)
-    study = Study(Scene(Table(tmp_path / "thin.nc"), thin.gait))
+    study = SceneTables(Scene(Table(tmp_path / "thin.nc"), thin.gait))
     assert np.isnan(study.fitted.A).all()
     np.testing.assert_allclose(study.poses("direct"), thin.displacement[0], rtol=1e-9)
     assert (
@@ -1441,7 +1441,7 @@ def test_a_log_of_trajectory_is_read(field, tmp_path, monkeypatch):
         == 0
     )
     f = measured.fit_log("tr.csv")
-    net = Study(load(field / "mine.toml")).poses("direct")
+    net = SceneTables(load(field / "mine.toml")).poses("direct")
     np.testing.assert_allclose(f.mean[0], net, atol=1e-4)
     np.testing.assert_allclose(f.displacement[0], net, atol=1e-4)
 

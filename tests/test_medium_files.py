@@ -10,7 +10,7 @@ from commands import geomech
 from tabled import tabled_json
 
 from geomech import scenes as scene
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.studies.sweep import sweep
 from rft import Chain, Granular, Table, body_velocity
 from rft.core.refusal import Refusal
@@ -319,7 +319,7 @@ def test_every_command_takes_a_table(folder):
         if args[0] == "displacement":
             table = tabled_json(out)
             for tier in ("direct", "path", "area"):
-                want = Study(plain).poses(tier, amplitudes=[0.5, 0.9])
+                want = SceneTables(plain).poses(tier, amplitudes=[0.5, 0.9])
                 np.testing.assert_allclose(table[tier], want, atol=3e-6)
 
 

@@ -11,7 +11,7 @@ from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection, coordinates, curvature
 from geomech.geometry.field import Field
 from geomech.geometry.minimum_perturbation import Basis, minimum_perturbation
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems import NoSlipSnake, Swimmer
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
@@ -62,7 +62,7 @@ def test_work_is_the_same_in_every_frame():
     scene = scene.changed(system=Swimmer(FLUID, Chain((0.7, 1.4, 0.9), length=0.3)))
     inner, outer = (
         scene.system,
-        Study(scene).in_frame("minimum-perturbation").scene.system,
+        SceneTables(scene).in_frame("minimum-perturbation").scene.system,
     )
     alpha, alphadot = np.random.default_rng(4).uniform(-0.8, 0.8, (2, 20, 2))
     here, there = (
@@ -231,7 +231,7 @@ def test_a_scene_in_it(law):
     """All tiers agree with the frame of the body by carrying over; its text is read back; one solve makes frame and field."""
     scene = scenes.parse(SCENE.format(law=law, numbers=LAWS[law]))
     own = scene.changed(system=scene.system.inner)
-    study, plain = Study(scene), Study(own)
+    study, plain = SceneTables(scene), SceneTables(own)
     assert (scene.frame, own.frame) == ("minimum-perturbation", "mean")
     start = scene.gait.shape(np.zeros(1))[0]
     carried = lambda g: scene.system.field.net(g, start)
@@ -311,7 +311,7 @@ def test_its_file_and_pictures(tmp_path):
     from geomech.studies import fields
 
     scene = scenes.parse(SCENE.format(law="viscous", numbers=LAWS["viscous"]))
-    fields.save_connection(tmp_path / "c.nc", Study(scene))
+    fields.save_connection(tmp_path / "c.nc", SceneTables(scene))
     with netcdf_file(tmp_path / "c.nc", mmap=False) as file:
         pose = file.variables["frame_pose"]
         assert np.array(pose[:]) == pytest.approx(scene.system.field.field.values)
@@ -332,7 +332,7 @@ def test_its_file_and_pictures(tmp_path):
 
 def test_a_connection_that_turns_by_a_gradient_alone():
     """The differential drive: of A^theta nothing is left, and in the middle the CCF is the cart's own."""
-    study = Study(scenes.load("differential-drive"))
+    study = SceneTables(scenes.load("differential-drive"))
     frame, c = smallest(study.fitted)
     assert np.abs(c.A[2]).max() < 1e-10 * np.abs(study.fitted.A[2]).max()
     assert frame.residual < 1e-10

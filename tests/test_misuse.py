@@ -22,8 +22,8 @@ from geomech.geometry import connection, curvature
 from geomech.geometry.stretch import stretch
 from geomech.scenes import Numerics, Scene
 from geomech.studies.choose import cheapest
+from geomech.studies.scene_tables import SceneTables
 from geomech.studies.single import single as single_of
-from geomech.studies.study import Study
 from geomech.systems import NoSlipSnake, Swimmer
 from rft import Backbone, Chain, Coulomb, EndCaps, Serpenoid, Viscous
 from rft.core.refusal import Refusal
@@ -46,7 +46,7 @@ def test_effects_in_a_list_are_those_in_a_tuple():
     )
     found = [
         tabled(
-            Study(Scene(s, Circle(), Numerics(grid=7, phases=16))).displacements(
+            SceneTables(Scene(s, Circle(), Numerics(grid=7, phases=16))).displacements(
                 [0.5], ["path", "direct"]
             )
         )
@@ -60,8 +60,8 @@ def test_effects_in_a_list_are_those_in_a_tuple():
 
 def test_results_are_equal_to_themselves_alone_and_have_a_hash():
     """Those that hold arrays, of which == is no single answer."""
-    study = Study(VISCOUS.with_numerics(grid=7, phases=16))
-    glass = Study(
+    study = SceneTables(VISCOUS.with_numerics(grid=7, phases=16))
+    glass = SceneTables(
         scenes.load("three-link-glass").with_numerics(
             grid=7, phases=16, harmonics=3, curves=4
         )
@@ -198,8 +198,8 @@ def test_from_python_units_are_warned_of_by_name():
     for make in (
         lambda: Scene(VISCOUS.system, Circle(amplitude=30)),
         lambda: Scene(NoSlipSnake(), Ellipse(centre=(7, 0))),
-        lambda: Study(VISCOUS).poses("direct", amplitudes=[1, -30]),
-        lambda: tabled(Study(VISCOUS).displacements([30], ["direct"])),
+        lambda: SceneTables(VISCOUS).poses("direct", amplitudes=[1, -30]),
+        lambda: tabled(SceneTables(VISCOUS).displacements([30], ["direct"])),
         lambda: tabled(cheapest(VISCOUS, [30.0], 1.0)),
         lambda: single_of(VISCOUS.system, [30, 17], [1, 0]),
         lambda: single_of(NoSlipSnake(), [30, 17], [1, 0]),
@@ -221,7 +221,7 @@ def test_what_is_no_joint_angle_or_just_a_full_turn_is_not_noted():
         assert (code, err) == (0, "")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        assert Study(VISCOUS).poses("direct", amplitudes=[30]).shape == (1, 3)
+        assert SceneTables(VISCOUS).poses("direct", amplitudes=[30]).shape == (1, 3)
 
 
 def test_degrees_are_taken_wherever_angles_are(tmp_path):
@@ -330,7 +330,7 @@ def test_time_stepping_takes_negative_and_zero_amplitudes_too():
         PLAIN
         + '[[effects]]\nkind = "transient"\ntravel = 0.1\n[numerics]\ncycles = 1\nphases = 32\n'
     )
-    below, rest, above = Study(scenes.parse(text)).poses(
+    below, rest, above = SceneTables(scenes.parse(text)).poses(
         "direct", None, [-0.2, 0.0, 0.2]
     )
     np.testing.assert_allclose(rest, 0.0, atol=1e-15)
@@ -402,7 +402,7 @@ def test_names_that_are_none_get_a_hint():
     with pytest.raises(
         ValueError, match="i and j must be two of the joints 0 to 1, got 0 and 2"
     ):
-        curvature.ccf(Study(VISCOUS.with_numerics(grid=5)).fitted, 0, 2)
+        curvature.ccf(SceneTables(VISCOUS.with_numerics(grid=5)).fitted, 0, 2)
 
 
 AXES = connection.grid(2, 5, 1.0)

@@ -14,7 +14,7 @@ from geomech.geometry.coordinates import change_velocity
 from geomech.scenes import Scene
 from geomech.studies import fields, sweep
 from geomech.studies.available import tiers
-from geomech.studies.study import Study, refuse_outside
+from geomech.studies.scene_tables import SceneTables, refuse_outside
 from geomech.systems import Swimmer, Table
 from geomech.systems.base import shape_labels
 from geomech.systems.swimmer import is_three_link
@@ -66,7 +66,7 @@ def test_body_velocity_and_work_are_those_of_the_plain_chain():
 @pytest.mark.parametrize("tier", ["direct", "adapted"])
 def test_tiers_are_those_of_the_plain_chain(tier, effects):
     of_modes, plain = (
-        Study(
+        SceneTables(
             Scene(Swimmer(SAND, body, effects), gait).with_numerics(
                 phases=24, curves=6, cycles=1, pieces=9
             )
@@ -118,8 +118,8 @@ def test_identity_modes_are_todays_chain(name):
     scene = scenes.load(name).with_numerics(grid=5, phases=32, curves=6, harmonics=5)
     eye = scenes.parse(scene.text.replace("[body]", "[body]\nmodes = [[1, 0], [0, 1]]"))
     eye, n = (
-        Study(eye.with_numerics(grid=5, phases=32, curves=6, harmonics=5)),
-        Study(scene),
+        SceneTables(eye.with_numerics(grid=5, phases=32, curves=6, harmonics=5)),
+        SceneTables(scene),
     )
     assert eye.tiers == n.tiers
     for tier in n.tiers:
@@ -137,7 +137,7 @@ def test_one_mode_and_many_modes():
     back_and_forth = Fourier(cos=[[0.5, 0.1]], sin=[[0.2, 0.3]])
     assert tiers(one) == ("adapted", "path", "direct")
     for tier in ("path", "direct"):
-        moved = Study(
+        moved = SceneTables(
             Scene(one, back_and_forth).with_numerics(grid=9, phases=256)
         ).poses(tier)
         np.testing.assert_allclose(moved, 0, atol=3e-5)
@@ -252,11 +252,11 @@ def test_modes_go_through_files(tmp_path):
         names = [file.variables[f"alpha_{k}"].long_name for k in (1, 2)]
         A = file.variables["A"][:].copy()
     assert names == [b"shape variable m_1", b"shape variable m_2"]
-    np.testing.assert_allclose(A, Study(scene).fitted.A, atol=1e-13)
+    np.testing.assert_allclose(A, SceneTables(scene).fitted.A, atol=1e-13)
     found = swept_table(sweep.sweep(scene, {"body.waves": [0.8, 1.2]}))["displacement"]
     for waves, pose in zip((0.8, 1.2), found):
         again = scene.changed(body=Chain((1,) * 7, modes="serpenoid", waves=waves))
-        np.testing.assert_allclose(pose, Study(again).poses("direct"), atol=1e-13)
+        np.testing.assert_allclose(pose, SceneTables(again).poses("direct"), atol=1e-13)
 
 
 def test_a_serpenoid_has_one_wave_if_it_does_not_say():
@@ -298,10 +298,10 @@ def test_a_wave_is_a_circle_in_serpenoid_modes(waves):
                                    .reshape(links - 1, 2, 16), 0, -1), atol=1e-14)  # fmt: skip
     plain = Swimmer(SAND, Chain(body.lengths))
     for tier in ("direct", "adapted"):
-        of_wave = Study(Scene(plain, wave).with_numerics(phases=32, curves=6)).poses(
-            tier
-        )
-        of_modes = Study(
+        of_wave = SceneTables(
+            Scene(plain, wave).with_numerics(phases=32, curves=6)
+        ).poses(tier)
+        of_modes = SceneTables(
             Scene(Swimmer(SAND, body), circle).with_numerics(phases=32, curves=6)
         ).poses(tier)
         np.testing.assert_allclose(of_wave, of_modes, atol=1e-13)
@@ -311,14 +311,16 @@ def test_a_wave_runs_to_the_tail_and_the_body_to_the_head():
     wave, t = Wave(joints=40, waves=1.5), np.linspace(0, 1, 5)
     crests = np.argmax(wave.shape(t)[:, 8:32], axis=-1)
     assert (np.diff(crests) <= 0).all() and crests[-1] < crests[0]
-    forward = Study(ROBOT).poses("direct")
+    forward = SceneTables(ROBOT).poses("direct")
     assert forward[0] > 0.2
     for backwards in (
         Wave(amplitude=0.87, waves=-1.0),
         Wave(amplitude=0.87, reverse=True),
     ):
-        assert Study(ROBOT.changed(gait=backwards)).poses("direct")[0] < -0.2
-    still = Study(ROBOT.changed(gait=Wave(amplitude=0.87, waves=0.0))).poses("direct")
+        assert SceneTables(ROBOT.changed(gait=backwards)).poses("direct")[0] < -0.2
+    still = SceneTables(ROBOT.changed(gait=Wave(amplitude=0.87, waves=0.0))).poses(
+        "direct"
+    )
     np.testing.assert_allclose(still, 0, atol=1e-6)
 
 
@@ -326,7 +328,7 @@ def test_an_offset_turns_the_body():
     """To the left where joints bend to the left; to the right it is the mirror image half a cycle later."""
     turned = {}
     for offset in (0.15, -0.15):
-        study = Study(ROBOT.changed(gait=Wave(amplitude=0.6, offset=offset)))
+        study = SceneTables(ROBOT.changed(gait=Wave(amplitude=0.6, offset=offset)))
         turned[offset] = study.poses("direct")[2]
     assert turned[0.15] > 0.05
     assert turned[-0.15] == pytest.approx(-turned[0.15], abs=1e-12)
@@ -348,7 +350,7 @@ def test_a_wave_is_swept_and_asked_for(tmp_path):
     found = swept_table(sweep.sweep(coarse, over))
     one = coarse.changed(gait=Wave(amplitude=0.87, waves=0.8, offset=0.1))
     np.testing.assert_allclose(
-        found["displacement"][0, 1, 1], Study(one).poses("direct"), atol=1e-13
+        found["displacement"][0, 1, 1], SceneTables(one).poses("direct"), atol=1e-13
     )
     code, out, _ = geomech(
         "displacement", "seven-link-wave", "--amplitudes", "0.87", "--json"
@@ -378,11 +380,13 @@ def test_a_table_keeps_the_names_of_modes(tmp_path, ending):
     scene = Scene(Swimmer(SAND, MODES), Circle(amplitude=0.4)).with_numerics(
         grid=5, extent=0.6, phases=16
     )
-    study = Study(scene)
+    study = SceneTables(scene)
     fields.save_connection(tmp_path / f"modes.{ending}", study)
     again = Table(tmp_path / f"modes.{ending}")
     assert shape_labels(again) == (("m_1", "rad"), ("m_2", "rad"))
-    fields.save_connection(tmp_path / f"twice.{ending}", Study(Scene(again, Circle())))
+    fields.save_connection(
+        tmp_path / f"twice.{ending}", SceneTables(Scene(again, Circle()))
+    )
     assert shape_labels(Table(tmp_path / f"twice.{ending}")) == shape_labels(again)
     with pytest.raises(ValueError, match="m_1 = .* lies outside"):
         refuse_outside(Scene(again, Circle(amplitude=9.0)))

@@ -10,7 +10,7 @@ from geomech.gaits import Circle, Ellipse
 from geomech.geometry import coordinates, metric
 from geomech.scenes import Scene
 from geomech.studies import motion as moving
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems import DifferentialDrive, FloatingChain, IdealFluidSwimmer
 from geomech.systems.capabilities import OwnMetric, capability
 from geomech.systems.framed import in_frame
@@ -148,7 +148,7 @@ def test_momentum_is_conserved_in_the_world(system, frame):
 
 
 def test_afloat_nothing_goes_anywhere_and_the_area_tells_how_far_it_turns():
-    study = Study(Scene(AFLOAT, OVAL, Numerics(grid=61)))
+    study = SceneTables(Scene(AFLOAT, OVAL, Numerics(grid=61)))
     direct = study.poses("direct")
     assert np.abs(direct[:2]).max() < 1e-15 and abs(direct[2]) > 5e-3
     np.testing.assert_allclose(study.poses("area"), direct, atol=1e-6)
@@ -208,7 +208,7 @@ def test_the_cart_drives_as_by_hand():
     np.testing.assert_allclose(
         xi, [[0.03, 0, 0], [0, 0, 0.4], [0.015, 0, -0.2]], atol=1e-15
     )
-    study = Study(
+    study = SceneTables(
         Scene(
             cart,
             Circle(amplitude=0.8, centre=(0.3, 1.0)),

@@ -20,7 +20,7 @@ from geomech.plots.style import STYLE
 from geomech.questions.trajectory import Trajectory
 from geomech.scenes import Numerics, Scene
 from geomech.studies import motion as moving
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems import NoSlipSnake, Solver, Swimmer
 from geomech.systems.capabilities import solver_of
 from rft import (
@@ -167,7 +167,7 @@ SCENES = {
 def test_a_cycle_ends_where_the_direct_tier_says(name):
     scene = SCENES[name]
     n = scene.numerics.phases
-    net = Study(scene).poses("direct")
+    net = SceneTables(scene).poses("direct")
     one, two = moving.motion(scene), moving.motion(scene, 2)
     np.testing.assert_allclose(one.pose[-1], net, atol=1e-13)
     np.testing.assert_allclose(two.pose[:n], one.pose[:n], atol=1e-13)
@@ -327,7 +327,7 @@ def chain():
 
 @pytest.fixture(scope="module")
 def field(chain):
-    return Study(chain.question.scene).curvature
+    return SceneTables(chain.question.scene).curvature
 
 
 def test_a_film_shows_body_track_and_shape(chain, field):

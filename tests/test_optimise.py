@@ -32,7 +32,7 @@ from geomech.optimisation.undulations import Undulations
 from geomech.questions.optimize import Optimize
 from geomech.scenes import Scene, parse
 from geomech.studies import estimate, fields
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems import Swimmer, Table
 from geomech.systems.capabilities import OwnMetric, capability
 from geomech.tiers.base import Numerics
@@ -128,7 +128,7 @@ def test_slopes_of_a_cycle_are_those_of_differences_of_whole_gaits(joints, mediu
 
 
 def test_slopes_through_a_table_are_those_of_differences():
-    table = Study(
+    table = SceneTables(
         geomech.load("three-link-glass").with_numerics(grid=11, harmonics=7)
     ).table("harmonic")
     loops, p = some_loop()
@@ -231,7 +231,7 @@ def test_what_is_told_is_what_the_scene_does(cheap):
     scene = parse(result_of(cheap).attributes["best_scene_toml"])
     assert scene.gait == cheap.gait
     assert scene.gait.amplitude == 1.0
-    net = Study(scene).poses("direct", amplitudes=[1.0])[0]
+    net = SceneTables(scene).poses("direct", amplitudes=[1.0])[0]
     assert net == pytest.approx(cheap.best.displacement, abs=1e-12)
     alpha, alphadot = scene.gait.cycle(256)
     power = scene.system.work(
@@ -241,7 +241,7 @@ def test_what_is_told_is_what_the_scene_does(cheap):
     assert cheap.best.length == pytest.approx(length, rel=1e-10)
     assert cheap.best.work == pytest.approx(2 * np.pi * power.mean(), rel=1e-10)
     assert cheap.value == pytest.approx(np.hypot(*net[:2]) / length, rel=1e-10)
-    Study(scene).poses("area", amplitudes=[1.0])  # its field holds it
+    SceneTables(scene).poses("area", amplitudes=[1.0])  # its field holds it
     assert scene.numerics.extent == 2.5  # and is no larger than need be
 
 
@@ -362,14 +362,16 @@ def test_limits_hold_and_are_named(short):
         "alpha_2 <= 1.2",
     }
     assert np.abs(short.gait.cycle(2000)[0]).max() <= 1.2 + 1e-9
-    best_circle = np.hypot(*Study(viscous()).poses("direct", Circle(), [1.2])[0, :2])
+    best_circle = np.hypot(
+        *SceneTables(viscous()).poses("direct", Circle(), [1.2])[0, :2]
+    )
     assert short.value > best_circle
 
 
 def test_a_start_beyond_the_limit_is_drawn_together(capsys):
     found = optimise(viscous(), limits=0.6)
     assert "its gait reaches beyond 0.6" in capsys.readouterr().err
-    small = np.hypot(*Study(viscous()).poses("direct", Circle(), [0.6])[0, :2])
+    small = np.hypot(*SceneTables(viscous()).poses("direct", Circle(), [0.6])[0, :2])
     assert found.start.value == pytest.approx(small, rel=1e-3)
     assert found.value > small
 
@@ -559,7 +561,7 @@ def test_waves_of_a_long_body():
     assert found.value > 1.5 * found.start.value
     assert isinstance(found.gait, Sine)
     rough = [
-        np.hypot(*Study(scene).poses("direct", Sine(amplitude=a, waves=w, elements=24), [a])[0, :2])
+        np.hypot(*SceneTables(scene).poses("direct", Sine(amplitude=a, waves=w, elements=24), [a])[0, :2])
         for a in (0.2, 0.4, 0.6) for w in (0.8, 1.0, 1.4)
     ]  # fmt: skip
     assert found.value >= max(rough)
@@ -653,7 +655,7 @@ def test_requests_that_make_no_sense(name, asked, said):
 
 def test_a_table_that_never_turns_is_refused_too(tmp_path):
     drive = geomech.load("differential-drive").with_numerics(extent=2.0, grid=7)
-    fields.save_connection(tmp_path / "drive.nc", Study(drive))
+    fields.save_connection(tmp_path / "drive.nc", SceneTables(drive))
     with pytest.raises(
         Refusal, match="no gait turns it: the table's file tells a body whose heading"
     ):
@@ -748,7 +750,7 @@ def test_the_loop_on_the_map(stroke, cheap, short, tmp_path):
     assert component == 0 and field.values[0, 15, 15] == pytest.approx(
         -0.0204, abs=2e-4
     )
-    study = Study(stroke.scene).in_frame("minimum-perturbation")
+    study = SceneTables(stroke.scene).in_frame("minimum-perturbation")
     for clim in (None, 0.01):  # sign and colours are those of the CCF in that frame
         drawn = plots.optimum_map(result_of(stroke), clim=clim).collections[0]
         ccf = (
@@ -917,7 +919,7 @@ def test_a_table_is_searched_like_its_scene(name, tmp_path):
     from geomech.studies.fields import save_connection
 
     scene = geomech.load(name).with_numerics(grid=21)
-    save_connection(tmp_path / "field.nc", Study(scene))
+    save_connection(tmp_path / "field.nc", SceneTables(scene))
     table = Scene(Table(str(tmp_path / "field.nc")), Circle())
     own, found = (
         optimise(s, "efficiency", harmonics=2)
@@ -1612,7 +1614,7 @@ def test_a_turn_may_be_off_by_its_error_where_cycles_are_not_those_of_the_search
     from rft.effects import Transient
 
     past = viscous(system=Swimmer(SAND, Chain(), (Transient(travel=0.1),)))
-    framed = Study(viscous()).in_frame("minimum-perturbation").scene
+    framed = SceneTables(viscous()).in_frame("minimum-perturbation").scene
     evaluation = types.SimpleNamespace(heading=0.3)
     slacks = [
         searching(build_request(scene, "displacement"))._slack(evaluation)

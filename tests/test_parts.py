@@ -20,8 +20,8 @@ from geomech.geometry.traits import Traits
 from geomech.io import tables
 from geomech.optimisation import optimise
 from geomech.scenes import Numerics, Scene, kinds, parse
+from geomech.studies.scene_tables import SceneTables
 from geomech.studies.single import single
-from geomech.studies.study import Study
 from geomech.systems.base import Cycle, integrated
 from rft.core.refusal import Refusal
 from rft.core.registry import REGISTRIES
@@ -205,7 +205,7 @@ def test_a_connection_is_written_in_a_format_of_ones_own(folder):
     assert geomech(*argv, "--sign", "-", *PLUGINS)[0] == 0
     written, wanted = (
         json.loads((folder / "made.json").read_text()),
-        Study(library.load("trike.toml")).fitted,
+        SceneTables(library.load("trike.toml")).fitted,
     )
     np.testing.assert_array_equal(written["A"], -wanted.A)
     np.testing.assert_array_equal(written["axes"], wanted.axes)
@@ -238,7 +238,7 @@ def test_what_was_loaded_is_in_its_registry_and_in_scenes(folder):
             scene.changed(text="", numerics=Numerics(grid=8, phases=32))
         )
         assert library.toml(parse(again)) == again
-        study = Study(scene)
+        study = SceneTables(scene)
         assert (
             np.isfinite(tabled(study.displacements([0.3]))["direct"]).all()
             and "leading" in study.tiers
@@ -281,7 +281,7 @@ def test_five_members_and_functions_go_through_everything(system, tmp_path):
         Circle(amplitude=0.5, centre=(0.1, 0.2)),
         Numerics(grid=7, extent=1.5, phases=32),
     )
-    study = Study(scene)
+    study = SceneTables(scene)
     assert study.tiers[-1] == "direct" and {"area", "adapted", "path"} <= {*study.tiers}
     result = study.displacements([0.3, 0.5], study.tiers)
     table = tabled(result)
@@ -311,7 +311,7 @@ def test_a_function_says_what_it_does_not_take():
     ):
         Scene(lambda alpha: alpha, Circle())
     with pytest.warns(VelocityWarning, match="not odd"):
-        _ = Study(
+        _ = SceneTables(
             Scene(lambda a, u: sled(a, u) + 0.1, Circle(), Numerics(grid=7, extent=1.5))
         ).fitted
     one = lambda a, u: [a[0] * u[1], 0.0, u[0]]  # of a single shape

@@ -23,9 +23,9 @@ from geomech.plots.precision import PANELS
 from geomech.plots.precision import SETTINGS as PRECISION
 from geomech.questions.texts import colour_limit
 from geomech.scenes.measurements import read
+from geomech.studies.scene_tables import SceneTables
 from geomech.studies.settings import Measured, padded
 from geomech.studies.settings import variables as of_measured
-from geomech.studies.study import Study
 from geomech.studies.tiered import SETTINGS
 from geomech.systems.base import shape_labels
 from geomech.tiers import TIERS
@@ -116,7 +116,7 @@ def test_the_line_of_zeros_leaves_noise_alone():
 def test_no_specks_on_the_default_map():
     """In loose glass the turn's field has loops of zeros less than half a radian across and single points whose error
     exceeds them; on its map there are neither."""
-    study = Study(scenes.load("three-link-glass"))
+    study = SceneTables(scenes.load("three-link-glass"))
     field, error = study.curvature, study.curvature_error
     raw = plots.figure(3, 3)[1][0, 0].contour(
         *field.axes, field.values[2].T, levels=[0.0]
@@ -299,7 +299,7 @@ def band(collection):
 
 def test_tiers_of_one_amplitude_stand_side_by_side():
     scene = scenes.load("three-link-viscous").with_numerics(grid=9)
-    table = Study(scene).displacements([0.5])
+    table = SceneTables(scene).displacements([0.5])
     ax = plots.displacement(table)
     points = [line.get_xdata().item() for line in ax.lines if line.get_marker() == "o"]
     bars = [bar.get_segments()[0][0, 0] for bar in ax.collections]
@@ -404,7 +404,7 @@ def test_measurements_are_read_in_the_units_of_the_results(
 
 def test_four_quantities_and_the_speed():
     glass = scenes.load("three-link-viscous").changed(gait=Ellipse(frequency=2.5))
-    table = Study(glass).displacements([0.5, 1.0], ["direct"])
+    table = SceneTables(glass).displacements([0.5, 1.0], ["direct"])
     names = ("x", "y", "theta", "distance")
     fig = plots.displacement_figure({"ellipse": table}, components=names)
     assert [ax.get_ylabel() for ax in fig.axes] == [f"{q} per cycle ({u})" for q, u in (
@@ -591,7 +591,7 @@ def test_panels_are_x_y_and_theta():
 
 def test_a_row_of_rounding_has_no_arrows():
     """A snake that cannot slip sideways, in the frame of a wheeled link: A^y is nothing."""
-    fitted = Study(
+    fitted = SceneTables(
         scenes.load("no-slip-snake").changed(frame="link-2").with_numerics(grid=8)
     ).fitted
     arrows = [plots.vector_field(fitted, row).collections[0] for row in range(3)]
@@ -607,7 +607,7 @@ def test_a_row_of_rounding_has_no_arrows():
 )
 def test_what_is_nothing_but_rounding_is_drawn_as_nothing(name, rows):
     """No patterns of 1e-16, no hatching over them; left out with a word unless it is asked for."""
-    study = Study(scenes.load(name).with_numerics(grid=9, phases=16))
+    study = SceneTables(scenes.load(name).with_numerics(grid=9, phases=16))
     draw = lambda **options: plots.ccf_figure(
         study.curvature, [study.scene.gait], error=study.curvature_error, **options
     )

@@ -15,8 +15,8 @@ from geomech.geometry.traits import Traits
 from geomech.geometry.two_form import spanned, spanned_by, two_form
 from geomech.scenes.frames import framed
 from geomech.studies.choose import cheapest
+from geomech.studies.scene_tables import SceneTables
 from geomech.studies.shape_space import through as _held
-from geomech.studies.study import Study
 from geomech.systems import Swimmer
 from geomech.tiers import TIERS
 from geomech.tiers.fitted import finest_grid, is_too_large
@@ -95,7 +95,7 @@ class Cubic:
 @pytest.mark.parametrize("pair", [(0, 1), (0, 2), (1, 2), (2, 0)])
 def test_planes_have_the_curvature_of_the_pair(pair):
     system, at, (i, j) = Cubic(), [0.3, -0.2, 0.4], pair
-    study = Study(Scene(system, LOOP, Numerics(grid=7, extent=1.2)))
+    study = SceneTables(Scene(system, LOOP, Numerics(grid=7, extent=1.2)))
     cut = study.plane(pair, at)
     shapes = np.broadcast_to(at, (7, 7, 3)).copy()
     shapes[..., i], shapes[..., j] = np.meshgrid(*cut.ccf.axes, indexing="ij")
@@ -145,7 +145,7 @@ def test_a_plane_is_that_of_the_whole_field_in_sand():
 def test_the_area_of_three_joints_is_the_integral_over_a_surface():
     """Without brackets, the line integral of A on every surface (Stokes); with them positions hang on it, turning does not."""
     sizes = np.array([0.4, 1.0])
-    flat = Study(Scene(Cubic(turns=0.0), LOOP, Numerics(grid=7, extent=1.2)))
+    flat = SceneTables(Scene(Cubic(turns=0.0), LOOP, Numerics(grid=7, extent=1.2)))
     along = (flat.scene.system.velocity(*LOOP.cycle(64, sizes))).mean(1) * 2 * np.pi
     table = tabled(flat.displacements(sizes, ["area", "direct"]))
     np.testing.assert_allclose(table["area"], along, atol=1e-12)
@@ -153,7 +153,7 @@ def test_the_area_of_three_joints_is_the_integral_over_a_surface():
         np.abs(along[:, :2]).min() > 1e-3
         and np.max(table["surface_spread"]["area"]) < 1e-12
     )
-    study = Study(Scene(Cubic(), LOOP, Numerics(grid=7, extent=1.2)))
+    study = SceneTables(Scene(Cubic(), LOOP, Numerics(grid=7, extent=1.2)))
     table = tabled(study.displacements(sizes, ["area", "direct"]))
     spread, turned = (
         np.array(table[key]["area"])
@@ -173,7 +173,7 @@ def test_the_area_of_three_joints_is_the_integral_over_a_surface():
 def test_the_spread_is_that_of_another_surface():
     """The cone over the first shape of the loop, by brute force."""
     system, sizes = Cubic(), [0.8]
-    study = Study(Scene(system, LOOP, Numerics(grid=7, extent=1.2, phases=256)))
+    study = SceneTables(Scene(system, LOOP, Numerics(grid=7, extent=1.2, phases=256)))
     found = []
     for tip in (0, 64, 128, 192, None):
         alpha, alphadot = (x[0] for x in LOOP.cycle(256, sizes))
@@ -257,7 +257,7 @@ def test_what_is_no_slice_is_refused(args, said, tmp_path):
 
 def test_rows_of_planes_say_what_is_held_and_gaits_cast_shadows():
     system = Swimmer(Viscous(2.3), Chain((0.7, 1.4, 0.9, 0.6)))
-    study = Study(Scene(system, LOOP, Numerics(grid=6, extent=1.2)))
+    study = SceneTables(Scene(system, LOOP, Numerics(grid=6, extent=1.2)))
     fig = plots.planes_figure(
         [study.plane((0, 1)), study.plane((2, 0), [0.0, 0.3, 0.0])], LOOP
     )
@@ -285,7 +285,7 @@ def test_rows_of_planes_say_what_is_held_and_gaits_cast_shadows():
 
 
 def test_many_joints_have_planes_and_no_field():
-    study = Study(
+    study = SceneTables(
         Scene(
             Swimmer(Viscous(2.0), Chain((1,) * 9)),
             Wave(amplitude=0.5, joints=8),
@@ -338,11 +338,11 @@ def test_beyond_the_field_tiers_solve_around_the_gait(monkeypatch):
     scene = Scene(
         Sandy(), gait, Numerics(grid=10, extent=1.0, interpolation=5, directions=64)
     )
-    tabulated, asked = Study(scene), ([0.5, 0.9], ["area", "path", "direct"])
+    tabulated, asked = SceneTables(scene), ([0.5, 0.9], ["area", "path", "direct"])
     found = tabled(tabulated.displacements(*asked))
     assert "field" in found["seconds"]
     monkeypatch.setattr("geomech.tiers.fitted.LARGEST_FIELD", 9_999)
-    study = Study(scene)
+    study = SceneTables(scene)
     around = tabled(study.displacements(*asked))
     assert "field" not in around["seconds"] and not any(
         key[0] == "connection" for key in study.computed
@@ -415,7 +415,7 @@ def test_what_hangs_on_the_surface_is_part_of_every_estimate(monkeypatch):
         TIERS._parts, "area", planned(TIERS["area"], spread=lambda *asked: spread)
     )
     scene = Scene(Cubic(), LOOP, Numerics(grid=7, extent=1.2))
-    table = tabled(Study(scene).displacements([0.4, 0.5], ["area"]))
+    table = tabled(SceneTables(scene).displacements([0.4, 0.5], ["area"]))
     assert (
         table["estimate"]["area"][0] == 0.3
         and 1e-6 < table["estimate"]["area"][1] < 0.3
@@ -461,7 +461,7 @@ def test_three_joints_keep_their_field_and_more_have_one_that_fits():
     ):
         framed(chain, Numerics(grid=15))
     scene = Scene(framed(chain, Numerics(grid=7)), Wave(joints=4), Numerics(grid=7))
-    assert Study(scene).cost([1.0], ["direct"]).balances > 7**4 * 16 / 2
+    assert SceneTables(scene).cost([1.0], ["direct"]).balances > 7**4 * 16 / 2
 
 
 def test_slices_hold_joints_in_their_order():
@@ -483,7 +483,7 @@ def test_slices_hold_joints_in_their_order():
 
 
 def test_a_surface_says_what_its_shades_mean():
-    study = Study(Scene(Cubic(), LOOP, Numerics(grid=6, extent=1.2)))
+    study = SceneTables(Scene(Cubic(), LOOP, Numerics(grid=6, extent=1.2)))
     flat = Fourier(
         cos=((0.5,), (0.0,), (0.0,)),
         sin=((0.0,), (0.0,), (0.4,)),

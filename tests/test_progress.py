@@ -10,7 +10,7 @@ import pytest
 from geomech import scenes, terminal
 from geomech.run import progress
 from geomech.run.progress import PRINT_INTERVAL, Computation
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems import Swimmer
 
 VISCOUS = scenes.load("three-link-viscous").with_numerics(grid=5)
@@ -119,7 +119,7 @@ def test_a_bar_in_a_notebook(notebook, monkeypatch, capsys):
 
 def test_a_table_from_python_shows_how_far_it_is(notebook, monkeypatch):
     monkeypatch.setattr(progress, "REDRAW_INTERVAL", 0.0)
-    study = Study(VISCOUS)
+    study = SceneTables(VISCOUS)
     assert np.isfinite(study.fitted.A).all()
     assert (
         "connection of three-link-viscous, 72 force balances: done in 0 s"
@@ -133,7 +133,7 @@ def test_a_table_from_python_shows_how_far_it_is(notebook, monkeypatch):
 def test_progress_may_be_taken_by_the_caller(notebook, monkeypatch):
     monkeypatch.setattr(progress, "REDRAW_INTERVAL", 0.0)
     told = []
-    Study(VISCOUS).compute_field(told.append)
+    SceneTables(VISCOUS).compute_field(told.append)
     assert told == [1.0] and notebook == []
 
 
@@ -144,7 +144,9 @@ def test_a_command_in_a_pipe_says_how_far_its_tables_are(monkeypatch, capsys):
         Swimmer, "velocity", lambda self, *x: time.sleep(0.1) or solve(self, *x)
     )
     with terminal.progress("displacement of x"):
-        Study(scenes.load("three-link-glass").with_numerics(grid=5)).poses("harmonic")
+        SceneTables(scenes.load("three-link-glass").with_numerics(grid=5)).poses(
+            "harmonic"
+        )
     lines = capsys.readouterr().err.splitlines()
     assert any(
         line.startswith("harmonics of three-link-glass, 216 force balances: under way")

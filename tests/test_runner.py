@@ -28,7 +28,7 @@ from geomech.run.store import Store
 from geomech.run.workers import using
 from geomech.scenes import inputs, kinds
 from geomech.studies import cost, estimate, tiered, walking
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems.capabilities import with_solver
 from rft import Backbone, DisturbedGround, Granular, Transient
 from rft import BodyInertia as Heavy
@@ -254,7 +254,7 @@ def test_studies_resume_to_the_last_digit(tmp_path, monkeypatch):
     )
 
     def field():
-        study = Study(scene)
+        study = SceneTables(scene)
         return [
             study.compute_metric().coefficients,
             study.fitted.A,

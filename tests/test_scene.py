@@ -11,7 +11,7 @@ from tabled import tabled
 import rft
 from geomech import scenes
 from geomech.studies.available import default_tiers
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems.base import as_system, length_unit
 from rft import Chain, Granular, Viscous
 from rft.core.refusal import Refusal
@@ -78,7 +78,7 @@ def test_a_class_of_ones_own_is_in_metres_where_it_has_a_length():
 def test_a_study_has_every_tier_its_errors_and_times(name):
     """Numbers of the scenes are pinned in test_builtin_scenes.py; a study's are those of `displacement`, tier by tier."""
     loaded = scenes.load(name).with_numerics(grid=11, phases=64)
-    study, amplitudes = Study(loaded), [0.1, 0.3]
+    study, amplitudes = SceneTables(loaded), [0.1, 0.3]
     table = tabled(study.displacements(amplitudes))
     assert set(default_tiers(loaded.system)) <= set(table)
     assert table["amplitude"] == amplitudes
@@ -282,7 +282,7 @@ def test_numerics_reach_the_solver_and_the_work():
 
 def test_the_path_of_a_linear_medium_needs_no_field():
     viscous = scenes.load("three-link-viscous")
-    table = tabled(Study(viscous).displacements([1.0], ["path", "direct"]))
+    table = tabled(SceneTables(viscous).displacements([1.0], ["path", "direct"]))
     assert "field" not in table["seconds"]
     assert math.hypot(*table["path"][0][:2]) == pytest.approx(0.0512808243, abs=5e-11)
     assert table["path"] == table["direct"]
@@ -295,17 +295,17 @@ def test_four_links_have_an_area_tier_and_two_have_none():
         + '[gait]\nkind = "fourier"\ncos = [[1.0], [0.5], [0.0]]\nsin = [[0.0], [0.5], [1.0]]'
     )
     assert default_tiers(four.system) == ("area", "path", "direct")
-    assert np.isfinite(Study(four).poses("direct")).all()
+    assert np.isfinite(SceneTables(four).poses("direct")).all()
     two = scenes.parse(
         text.replace("[1, 1, 1, 1]", "[1, 1]") + '[gait]\nkind = "wave"\njoints = 1\n'
     )
     with pytest.raises(Refusal, match="the area tier takes two joints and more"):
-        Study(two).poses("area")
+        SceneTables(two).poses("area")
 
 
 def test_loose_glass_circles():
     """Displacement per cycle on circles of 0.5, 1 and 1.75 rad, an independent computation's three digits."""
-    got = Study(scenes.load("three-link-glass")).poses(
+    got = SceneTables(scenes.load("three-link-glass")).poses(
         "direct", amplitudes=np.array([0.5, 1.0, 1.75])
     )
     np.testing.assert_allclose(

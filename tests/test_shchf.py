@@ -13,7 +13,7 @@ from geomech import scenes
 from geomech.gaits import Butterfly, Circle, Shchf
 from geomech.io import shchf
 from geomech.scenes import Scene
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems import Swimmer
 from rft.core.refusal import Refusal
 
@@ -44,7 +44,7 @@ EFFICIENCY = (
 )
 def test_its_optima_move_as_published(XV, distance, length):
     """Distance and path length of the published optima (Ramasamy and Hatton)."""
-    study = Study(
+    study = SceneTables(
         Scene(Swimmer(rft.Viscous(2.0), rft.Chain()), Shchf(XV=XV))
     ).with_numerics(phases=64)
     assert np.hypot(*study.poses("direct", None, [1.0])[0, :2]) == pytest.approx(

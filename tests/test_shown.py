@@ -18,7 +18,7 @@ from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection, curvature
 from geomech.scenes import Numerics, Scene, load
 from geomech.studies import fields
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems import NoSlipSnake, Swimmer
 from rft.laws import CATALOGUE
 
@@ -30,7 +30,7 @@ PNG = b"\x89PNG\r\n"
 
 @pytest.fixture(scope="module")
 def study():
-    made = Study(
+    made = SceneTables(
         Scene(
             Swimmer(CATALOGUE["glass-0.3mm-loose"].medium, UNEVEN),
             GAIT,
@@ -121,11 +121,11 @@ def test_reprs_are_short_and_say_shapes_ranges_and_units(study, table, swept):
         assert [x for x in said if x not in text] == [], text
     assert re.search(r"; residual up to \d\.\de-\d\d; with work\)$", repr(cycle))
     assert repr(table).splitlines()[0].startswith("scene: displacement per cycle")
-    snake = Study(Scene(NoSlipSnake(), GAIT, Numerics(grid=7)))
+    snake = SceneTables(Scene(NoSlipSnake(), GAIT, Numerics(grid=7)))
     assert "rad; 7 singular; A x" in repr(snake.fitted) and " singular; values" in repr(
         snake.curvature
     )
-    three = Study(
+    three = SceneTables(
         Scene(
             Swimmer(rft.Viscous(), rft.Chain((1, 1, 1, 1))),
             rft_wave(),
@@ -166,14 +166,14 @@ def test_notebooks_get_tables_and_pictures(study, table):
     assert float(cells[8]) == pytest.approx(x, rel=1e-3, abs=1e-9)
     from geomech import notebook
 
-    fresh = Study(study.scene)
+    fresh = SceneTables(study.scene)
     assert pictures(notebook.study(fresh)) == []
     assert "nothing yet" in notebook.study(fresh)
     assert fresh.computed == ()  # nothing is computed to be shown
     assert study.curvature.values is not None
     assert study.curvature_error.values is not None
     assert len(pictures(notebook.study(study))) == 1
-    named = Study(study.scene.changed(name="<script>"))
+    named = SceneTables(study.scene.changed(name="<script>"))
     assert "<script>" not in notebook.study(named)
 
 
@@ -190,7 +190,7 @@ def test_data_sets_are_those_of_the_files(study, tmp_path):
                 xarray.testing.assert_equal(mine[name], data[name])
                 assert mine[name].attrs == data[name].attrs
     modes = Swimmer(rft.Viscous(2.0), rft.Chain(modes=((1.0, 0.5), (0.2, -0.9))))
-    moved = Study(Scene(modes, GAIT).with_numerics(grid=7, phases=16))
+    moved = SceneTables(Scene(modes, GAIT).with_numerics(grid=7, phases=16))
     data = moved.fitted.to_xarray(shapes=["m_1", "m_2"])
     names = ["shape variable m_1", "shape variable m_2"]
     assert [data[f"alpha_{k}"].long_name for k in (1, 2)] == names
@@ -205,7 +205,7 @@ def of_length(length):
     gait = Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.3, -0.2), frequency=2.5)
     body = rft.Chain((0.7, 1.4, 0.9), frame="link-1", length=length)
     numerics = Numerics(grid=7, extent=2.0, phases=32)
-    made = Study(Scene(Swimmer(sand, body), gait, numerics))
+    made = SceneTables(Scene(Swimmer(sand, body), gait, numerics))
     return made, made.displacements([0.5, 1.0], ["area", "path", "direct"])
 
 
@@ -319,7 +319,7 @@ class Kept:
 
 
 def test_a_kept_connection_has_the_unit_of_its_system():
-    kept = Study(Scene(Kept(), Circle(amplitude=0.5), Numerics(phases=16)))
+    kept = SceneTables(Scene(Kept(), Circle(amplitude=0.5), Numerics(phases=16)))
     assert (kept.fitted.unit, kept.fitted.length, kept.curvature.unit) == (
         "m",
         0.42,

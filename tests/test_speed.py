@@ -16,7 +16,7 @@ from geomech.gaits import Circle
 from geomech.io.results import of_dict
 from geomech.studies import report, sweep, undulation
 from geomech.studies.choose import cheapest
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems import Swimmer
 from rft import BodyInertia, GrainInertia
 from rft.core.refusal import Refusal
@@ -113,7 +113,7 @@ def test_from_python_too():
     for contradict in (
         lambda: scene.changed(gait=Circle(frequency=2.0)),
         lambda: tabled(
-            Study(scene).displacements([0.5], ["direct"], Circle(frequency=2.0))
+            SceneTables(scene).displacements([0.5], ["direct"], Circle(frequency=2.0))
         ),
     ):
         with pytest.raises(
@@ -122,7 +122,9 @@ def test_from_python_too():
         ):
             contradict()
     assert (
-        tabled(Study(scene).displacements([0.5], ["direct"], Circle()))["frequency"]
+        tabled(SceneTables(scene).displacements([0.5], ["direct"], Circle()))[
+            "frequency"
+        ]
         == 2.5
     )
     assert [g.frequency for g in report.compared(scene)] == [
@@ -133,7 +135,7 @@ def test_from_python_too():
 def test_every_displacement_is_a_speed():
     scene = scenes.parse(CHAIN)
     table, amplitudes = (
-        tabled(Study(scene).displacements([0.5, 1.0], ["area", "direct"])),
+        tabled(SceneTables(scene).displacements([0.5, 1.0], ["area", "direct"])),
         [0.5, 1.0],
     )
     for tier in ("area", "direct"):
@@ -147,7 +149,7 @@ def test_every_displacement_is_a_speed():
         )
         np.testing.assert_allclose(table["turning_rate"][tier], 2.5 * poses[:, 2])
     plain = tabled(
-        Study(scenes.parse(CHAIN.replace("frequency = 2.5", ""))).displacements(
+        SceneTables(scenes.parse(CHAIN.replace("frequency = 2.5", ""))).displacements(
             amplitudes, ["area", "direct"]
         )
     )
@@ -166,7 +168,7 @@ def test_every_displacement_is_a_speed():
 
 
 def test_what_is_nothing_but_its_error_is_zero():
-    study = Study(scenes.parse(CHAIN))
+    study = SceneTables(scenes.parse(CHAIN))
     result = study.displacements([0.5, 1.0], ["direct"])
     y = dataclasses.replace(result["y"], values=[[1e-8, -1e-8]], error=[[2e-8, 3e-8]])
     lines = str(result.with_variables(y)).splitlines()
@@ -189,7 +191,7 @@ def test_sweeps_give_it(tmp_path):
         np.hypot(*np.moveaxis(found["displacement"], -1, 0)[:2]) * [1.0, 2.5, 4.0],
     )
     alone = tabled(
-        Study(
+        SceneTables(
             scene.changed(gait=dataclasses.replace(scene.gait, amplitude=1.0))
         ).displacements([1.0], ["direct"])
     )

@@ -10,7 +10,7 @@ from geomech.geometry import connection, harmonics
 from geomech.geometry.traits import Traits
 from geomech.scenes import Numerics, Scene
 from geomech.studies.available import default_tiers
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems import Swimmer
 from geomech.tiers import harmonic
 from rft import CATALOGUE, Chain
@@ -94,7 +94,7 @@ def test_three_joints_in_sand_within_a_few_percent():
         cos=((1.0, 0.0), (0.2, 0.3), (-0.5, 0.2)),
         sin=((0.1, 0.2), (0.9, 0.0), (0.4, -0.4)),
     )
-    study = Study(Scene(chain, gait, Numerics(grid=6, extent=0.6, phases=64)))
+    study = SceneTables(Scene(chain, gait, Numerics(grid=6, extent=0.6, phases=64)))
     assert (
         "harmonic" not in default_tiers(chain)
         and harmonic.directions(chain, study.scene.numerics) == 110

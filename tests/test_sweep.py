@@ -8,7 +8,7 @@ from tabled import swept_table
 
 from geomech import scenes
 from geomech.studies import cycles, estimate, grid, sweep
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from rft import CATALOGUE, Granular
 from rft.core.refusal import Refusal
 
@@ -61,7 +61,7 @@ def test_parameters_of_a_medium_given_by_name_can_be_swept():
         )
     )
     np.testing.assert_allclose(
-        results["displacement"][1, 0], Study(alone).poses("direct"), rtol=1e-9
+        results["displacement"][1, 0], SceneTables(alone).poses("direct"), rtol=1e-9
     )
 
 
@@ -165,7 +165,9 @@ def test_a_level_ground_is_no_gentle_slope(without_estimates):
     found = swept_table(
         sweep.sweep(parse(text + effects), {"effects.depth-profile.slope": [0.0, 0.05]})
     )
-    level = Study(parse(text + PAST + '"transient"\ntravel = 0.03')).poses("direct")
+    level = SceneTables(parse(text + PAST + '"transient"\ntravel = 0.03')).poses(
+        "direct"
+    )
     np.testing.assert_allclose(found["displacement"][0], level, atol=2e-6)
 
 
@@ -175,10 +177,10 @@ def test_a_scene_changed_since_it_was_read_is_swept_as_it_is():
     found = swept_table(
         sweep.sweep(plain, {"gait.amplitude": [0.1], "medium.C": [1.8, 3.0]})
     )["displacement"]
-    assert Study(plain).poses("direct", None, 0.1) == pytest.approx(
+    assert SceneTables(plain).poses("direct", None, 0.1) == pytest.approx(
         found[0, 0], abs=1e-9
     )
-    assert np.abs(found[0, 0] - Study(fish).poses("direct", None, 0.1))[0] > 0.01
+    assert np.abs(found[0, 0] - SceneTables(fish).poses("direct", None, 0.1))[0] > 0.01
     with pytest.raises(Refusal, match="the scene has no effect 'end-caps'"):
         swept_table(sweep.sweep(plain, {"effects.end-caps.radius": [0.1]}))
 
@@ -191,7 +193,9 @@ def test_one_frequency_for_all_effects(without_estimates):
     swept = swept_table(sweep.sweep(swimmer, {"effects.frequency": [0.0, 3.0, 9.0]}))
     found = swept["displacement"]
     assert swept["frequency"].tolist() == [0.0, 3.0, 9.0]
-    np.testing.assert_allclose(found[1], Study(swimmer).poses("direct"), atol=1e-9)
+    np.testing.assert_allclose(
+        found[1], SceneTables(swimmer).poses("direct"), atol=1e-9
+    )
     assert np.abs(found[0] - found[2]).max() > 3e-3
     with pytest.raises(
         Refusal,

@@ -9,7 +9,7 @@ from registry import SYSTEMS
 from geomech import scenes, symbolic
 from geomech.gaits import Circle
 from geomech.scenes import Scene
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.symbolic import connections
 from geomech.systems import (
     DifferentialDrive,
@@ -179,7 +179,9 @@ def test_the_area_is_that_of_the_formula():
         np.broadcast_arrays(*density(0.4 + r * np.cos(t), -0.1 + r * np.sin(t)))
     )
     total = (values * r * 0.25 * weights[:, None]).sum((1, 2)) * 2 * np.pi / 24
-    area = Study(Scene(swimmer, gait, Numerics(grid=61, extent=1.5))).poses("area")
+    area = SceneTables(Scene(swimmer, gait, Numerics(grid=61, extent=1.5))).poses(
+        "area"
+    )
     np.testing.assert_allclose(area, se2.exp(total), atol=2e-7)
 
 

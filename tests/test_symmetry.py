@@ -18,7 +18,7 @@ from geomech.geometry.symmetry import (
 )
 from geomech.geometry.traits import Traits
 from geomech.scenes.model import Scene
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from rft.bodies.base import body_size
 from rft.core.premise import Premise
 from rft.core.refusal import Refusal
@@ -96,7 +96,7 @@ def test_displacements_have_the_zeros_that_are_claimed(name):
         small = dataclasses.replace(gait, amplitude=0.5 * gait.amplitude)
         try:
             table = tabled(
-                Study(Scene(system, small, name="s")).displacements(
+                SceneTables(Scene(system, small, name="s")).displacements(
                     [small.amplitude], ["direct"]
                 )
             )

@@ -17,7 +17,7 @@ from geomech.io.tables import sysplotter
 from geomech.io.tables.base import Stored
 from geomech.scenes import Scene
 from geomech.studies import fields
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems import (
     DifferentialDrive,
     IdealFluidSwimmer,
@@ -42,7 +42,7 @@ def write(path, version=5, **changes):
 
 
 def study(path, **settings):
-    return Study(Scene(Table(path, **settings), Circle()))
+    return SceneTables(Scene(Table(path, **settings), Circle()))
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -123,7 +123,7 @@ def test_a_base_frame_without_our_name_keeps_its_own(tmp_path):
 def test_what_it_computed_agrees_with_ours_but_for_its_elements(tmp_path):
     """On 15 points over +-3 rad differences of neighbours cost its CCF 3.8 % in the middle, linear elements its frame 1 to 2 %
     of the largest pose. A genuine file, on 31 points over +-pi, loses 0.9 and 0.5 %."""
-    source = Study(Scene(SWIMMER, Circle())).with_numerics(
+    source = SceneTables(Scene(SWIMMER, Circle())).with_numerics(
         grid=61, extent=3.0, phases=64
     )
     table = study(write(tmp_path / "s.mat")).with_numerics(phases=64)
@@ -243,7 +243,7 @@ def test_a_struct_without_geometry_is_one_of_unknown_lengths_and_frame(tmp_path)
 
 
 def test_singular_shapes_are_not_exported(tmp_path):
-    source = Study(
+    source = SceneTables(
         Scene(NoSlipSnake(), Circle(amplitude=0.5, centre=(1.5, -1.5)))
     ).with_numerics(grid=7, extent=2.5)
     with pytest.raises(
@@ -342,7 +342,7 @@ def test_parts_of_version_7_3_are_refused_by_place(tmp_path):
 def test_an_exported_struct_has_all_that_its_scripts_read(frame, tmp_path):
     """Of a body of 0.3 m: read again it is what it was, and loaded by SciPy it has the fields, shapes and signs."""
     uneven = Swimmer(rft.Viscous(2.0), rft.Chain((0.7, 1.4, 0.9), 0.3))
-    source = Study(Scene(uneven, Circle())).with_numerics(grid=21, extent=1.5)
+    source = SceneTables(Scene(uneven, Circle())).with_numerics(grid=21, extent=1.5)
     source = source if frame == "mean" else source.in_frame(frame)
     fields.save_connection(tmp_path / "s.mat", source, layout="struct")
     again = study(tmp_path / "s.mat")
@@ -397,7 +397,7 @@ def test_an_exported_struct_has_all_that_its_scripts_read(frame, tmp_path):
 
 
 def test_an_exported_struct_of_sand_keeps_what_its_fit_left(tmp_path):
-    source = Study(
+    source = SceneTables(
         Scene(Swimmer(rft.Granular(1.8, 0.24), SWIMMER.body), Circle())
     ).with_numerics(grid=7, extent=1.5)
     fields.save_connection(tmp_path / "s.mat", source, layout="struct")
@@ -504,7 +504,7 @@ def test_a_connection_with_a_denominator_is_that_of_avec(tmp_path):
 def test_systems_of_other_kinds_are_exported_with_what_is_known_of_them(
     system, kind, tmp_path
 ):
-    source = Study(Scene(system, Circle(amplitude=0.5))).with_numerics(
+    source = SceneTables(Scene(system, Circle(amplitude=0.5))).with_numerics(
         grid=9, extent=1.0
     )
     fields.save_connection(tmp_path / "s.mat", source, layout="struct")

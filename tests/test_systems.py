@@ -18,8 +18,8 @@ from geomech.geometry.traits import Traits
 from geomech.scenes import Scene
 from geomech.studies import cost, estimate, fields
 from geomech.studies.available import default_tiers
+from geomech.studies.scene_tables import SceneTables
 from geomech.studies.single import single
-from geomech.studies.study import Study
 from geomech.systems import KINDS, NoSlipSnake, Swimmer
 from geomech.systems.base import WrappedSystem, kind_of, length_unit
 from geomech.systems.capabilities import stored_table
@@ -91,7 +91,9 @@ def test_no_wheel_slips_in_any_frame(frame):
 
 
 def snake(**numerics):
-    return Study(Scene(NoSlipSnake(frame="link-2"), AWAY).with_numerics(**numerics))
+    return SceneTables(
+        Scene(NoSlipSnake(frame="link-2"), AWAY).with_numerics(**numerics)
+    )
 
 
 def test_tiers_of_the_snake_agree_with_its_closed_form():
@@ -118,7 +120,7 @@ def test_the_built_in_snake_goes_where_its_closed_form_does():
     net = direct(symbolic.velocity(*closed_form()), scene.gait, None, 512)
     h = Chain(frame="link-2").frame_pose("mean", scene.gait.shape(0.0), [0.0, 0.0])[0]
     wanted = se2.compose(se2.compose(se2.inverse(h), net), h)
-    np.testing.assert_allclose(Study(scene).poses("direct"), wanted, atol=1e-12)
+    np.testing.assert_allclose(SceneTables(scene).poses("direct"), wanted, atol=1e-12)
 
 
 @pytest.mark.parametrize("lengths", [(1, 1, 1), (1, 1.5, 0.7)])
@@ -126,7 +128,7 @@ def test_singular_shapes_are_left_out_of_fields(lengths):
     """The mask holds the zeros of the determinant and nothing farther off; elsewhere A and CCF are those of
     formulas."""
     system = NoSlipSnake(lengths, frame="link-2")
-    study = Study(Scene(system, AWAY).with_numerics(grid=41, extent=2.0))
+    study = SceneTables(Scene(system, AWAY).with_numerics(grid=41, extent=2.0))
     fitted, ccf, error = (
         study.fitted,
         study.curvature.values,
@@ -266,7 +268,7 @@ def test_whatever_has_a_velocity_is_a_system():
                 -1,
             )
 
-    study = Study(Scene(Disc(), Circle(centre=(0.2, 0.6))))
+    study = SceneTables(Scene(Disc(), Circle(centre=(0.2, 0.6))))
     assert study.tiers == ("area", "adapted", "path", "harmonic", "direct")
     truth = study.poses("direct", None, [0.2])
     for tier in study.tiers:

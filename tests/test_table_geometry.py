@@ -18,7 +18,7 @@ from geomech.geometry.coordinates import change_velocity
 from geomech.io import tables
 from geomech.scenes import Numerics, Scene
 from geomech.studies import effort, estimate, fields
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems import Swimmer, Table
 from rft.core.refusal import Refusal
 from rft.formulas import se2
@@ -35,7 +35,7 @@ def sources(tmp_path_factory):
     """{medium: (study, its files by ending)} of one body of 0.3 m."""
     found = {}
     for name, medium in (("glass", GLASS), ("viscous", VISCOUS)):
-        study = Study(
+        study = SceneTables(
             Scene(
                 Swimmer(medium, UNEVEN),
                 GAIT,
@@ -53,7 +53,7 @@ def sources(tmp_path_factory):
 
 
 def on(path, gait=GAIT, **settings):
-    return Study(Scene(Table(path, **settings), gait))
+    return SceneTables(Scene(Table(path, **settings), gait))
 
 
 @pytest.mark.parametrize("frame", FRAMES)
@@ -276,7 +276,7 @@ def test_a_stretched_picture_and_the_most_efficient_gait_of_a_table(
     ]
     assert efficiency[0] == pytest.approx(efficiency[1], rel=2e-3)
     best = [
-        Study(Scene(x.scene.system, Circle(amplitude=0.8), x.scene.numerics))
+        SceneTables(Scene(x.scene.system, Circle(amplitude=0.8), x.scene.numerics))
         for x in (on(files[".mat"]), source)
     ]
 

@@ -33,8 +33,8 @@ from geomech.io.tables.base import checked_names
 from geomech.io.tables.mat import ERROR
 from geomech.scenes import Numerics, Scene
 from geomech.studies import choose, estimate, fields, tiered
+from geomech.studies.scene_tables import SceneTables
 from geomech.studies.single import single
-from geomech.studies.study import Study
 from geomech.systems import NoSlipSnake, Swimmer, Table
 from geomech.systems.base import length_unit
 from geomech.systems.capabilities import stored_table, table_error
@@ -50,7 +50,7 @@ GAIT = Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.3, -0.2))
 
 
 def study(medium=GLASS, body=UNEVEN, **numerics):
-    return Study(
+    return SceneTables(
         Scene(
             Swimmer(medium, body),
             GAIT,
@@ -108,7 +108,7 @@ def test_netcdf_gives_back_every_digit(made):
 
 def test_netcdf_of_three_joints_and_of_singular_shapes(tmp_path):
     wave = Fourier(cos=((0.2,), (0.1,), (0.0,)), sin=((0.0,), (0.3,), (0.4,)))
-    five = Study(
+    five = SceneTables(
         Scene(
             Swimmer(GLASS, rft.Chain((1, 2, 1.5, 1))),
             wave,
@@ -117,13 +117,13 @@ def test_netcdf_of_three_joints_and_of_singular_shapes(tmp_path):
     )
     fields.save_connection(tmp_path / "a.nc", five)
     same(Connection.load(tmp_path / "a.nc"), five.fitted)
-    assert Study(Scene(Table(tmp_path / "a.nc"), wave)).tiers == (
+    assert SceneTables(Scene(Table(tmp_path / "a.nc"), wave)).tiers == (
         "area",
         "adapted",
         "path",
         "direct",
     )
-    snake = Study(Scene(NoSlipSnake(), GAIT, Numerics(grid=7)))
+    snake = SceneTables(Scene(NoSlipSnake(), GAIT, Numerics(grid=7)))
     fields.save_connection(tmp_path / "b.nc", snake)
     same(Connection.load(tmp_path / "b.nc"), snake.fitted)
     fields.save_connection(tmp_path / "b.mat", snake)
@@ -148,7 +148,7 @@ def test_a_mat_round_trip_keeps_every_digit(sign, order, made, tmp_path):
     np.testing.assert_array_equal(A, (1 if sign == "+" else -1) * s.fitted.A[1, 1])
     run = np.meshgrid(*s.fitted.axes, indexing="ij" if order == "ndgrid" else "xy")
     np.testing.assert_array_equal([found["alpha1"], found["alpha2"]], run)
-    again = Study(Scene(Table(tmp_path / "a.mat"), GAIT))
+    again = SceneTables(Scene(Table(tmp_path / "a.mat"), GAIT))
     np.testing.assert_array_equal(again.fitted.A, s.fitted.A)
     np.testing.assert_array_equal(again.fitted.residual, s.fitted.residual)
     assert (
@@ -166,7 +166,7 @@ def test_a_mat_round_trip_keeps_every_digit(sign, order, made, tmp_path):
 def test_a_mat_file_takes_two_joints_and_says_why(links, tmp_path, monkeypatch):
     """Before anything is computed."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(Study, "compute_field", None)
+    monkeypatch.setattr(SceneTables, "compute_field", None)
     gait = Fourier(cos=((0.2,),) * (links - 1), sin=((0.1,),) * (links - 1))
     scene = Scene(
         Swimmer(rft.Viscous(2.0), rft.Chain((1,) * links)), gait, Numerics(grid=5)
@@ -174,7 +174,7 @@ def test_a_mat_file_takes_two_joints_and_says_why(links, tmp_path, monkeypatch):
     Path("mine.toml").write_text(scenes.toml(scene))
     said = f"a .mat file has a layout of 2 joints, and this body has {links - 1}: write a .nc file"
     with pytest.raises(Refusal, match=said):
-        fields.save_connection("a.mat", Study(scene))
+        fields.save_connection("a.mat", SceneTables(scene))
     for more in ((), ("--plot", "a.png")):
         code, _, err = geomech("connection", "mine.toml", "-o", "a.mat", *more)
         assert code == 2 and said in err and err.count("\n") == 1 and "maps" not in err
@@ -226,7 +226,7 @@ def test_intervals_of_a_table_of_ones_own_are_kept_and_part_of_its_error(
         np.testing.assert_allclose(
             halves, error * np.array([0.5, 0.5, 1]).reshape(3, 1, 1, 1)
         )
-    table = Study(Scene(Table(path), GAIT))
+    table = SceneTables(Scene(Table(path), GAIT))
     np.testing.assert_array_equal(fields.of_study(table).to_xarray().A_error, error)
     fields.save_connection(tmp_path / "b.nc", table)
     fields.save_connection(tmp_path / "b.mat", table, sign="-", order="meshgrid")
@@ -365,7 +365,7 @@ def test_a_table_predicts_what_its_scene_predicts_within_its_error(
 ):
     source = study(medium, BODIES[body], grid=21, extent=2.3, harmonics=9)
     fields.save_connection(tmp_path / f"a{ending}", source)
-    table = Study(Scene(Table(tmp_path / f"a{ending}"), GAIT))
+    table = SceneTables(Scene(Table(tmp_path / f"a{ending}"), GAIT))
     ratios, length = [], body_size(source.scene.system)  # of the body, m in one of them
     for gait in GAITS:
         amplitudes = [0.3, 0.8, 1.2]
@@ -449,7 +449,7 @@ def random_scene(rng):
 def test_errors_of_tables_of_random_scenes_cover(tmp_path):
     ratios = {".nc": [], ".mat": []}
     for seed in range(100):
-        source = Study(random_scene(np.random.default_rng(seed)))
+        source = SceneTables(random_scene(np.random.default_rng(seed)))
         gait, length = source.scene.gait, body_size(source.scene.system)
         amplitudes = gait.amplitude * np.array([0.3, 0.7, 1.0])
         for ending in ratios:
@@ -474,7 +474,9 @@ def test_errors_of_tables_of_random_scenes_cover(tmp_path):
 def test_what_is_even_in_alphadot_is_part_of_the_error(ending, tmp_path):
     """Skin friction that tells forwards from backwards: A, and odd harmonics, know nothing of it."""
     swimmer = Swimmer(GLASS, UNEVEN, (rft.SkinFriction(0.05, 0.25),))
-    source = Study(Scene(swimmer, GAIT, Numerics(grid=15, extent=2.0, harmonics=9)))
+    source = SceneTables(
+        Scene(swimmer, GAIT, Numerics(grid=15, extent=2.0, harmonics=9))
+    )
     alpha, unit = (
         np.array([source.fitted.axes[0][3], source.fitted.axes[1][10]]),
         connection.directions(2, 8),
@@ -495,7 +497,7 @@ def test_what_is_even_in_alphadot_is_part_of_the_error(ending, tmp_path):
         )
         assert (off <= errors).all()
     if ending == ".nc":
-        fields.save_connection(tmp_path / "b.nc", Study(table))
+        fields.save_connection(tmp_path / "b.nc", SceneTables(table))
         np.testing.assert_array_equal(
             tables.load(tmp_path / "b.nc").even, source.even_part
         )
@@ -503,7 +505,7 @@ def test_what_is_even_in_alphadot_is_part_of_the_error(ending, tmp_path):
 
 def test_a_bare_mat_file_becomes_netcdf_that_says_what_it_does_not_know(made, tmp_path):
     plain_mat(tmp_path / "a.mat", made[1].fitted)
-    bare = Study(Scene(Table(tmp_path / "a.mat"), GAIT))
+    bare = SceneTables(Scene(Table(tmp_path / "a.mat"), GAIT))
     assert single(bare.scene.system, [0.2, 0.3], [1, 0])["residual"] is None
     fields.save_connection(tmp_path / "a.nc", bare)
     held = tables.load(tmp_path / "a.nc")

@@ -15,7 +15,7 @@ from geomech.scenes import Numerics, Scene
 from geomech.studies import estimate
 from geomech.studies.available import default_tiers
 from geomech.studies.choose import cheapest
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems import Swimmer
 from geomech.tiers import TIERS, Plan, Tier, fitted
 from geomech.tiers.direct import direct
@@ -28,7 +28,7 @@ from rft.formulas import se2
 
 pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = scenes.load("three-link-glass")
-BENCH = Study(GLASS)
+BENCH = SceneTables(GLASS)
 RADII = np.linspace(0.5, 2.0, 13)
 SCALES = np.linspace(0.25, 1.0, 7)
 
@@ -139,7 +139,7 @@ def test_families_of_every_gait(name, medium):
     """Exact up to the table, whether or not the body turns on the whole."""
     swimmer = Scene(Swimmer(MEDIA[medium], Chain()), GAITS[name], Numerics(curves=48))
     adapted, direct = (
-        Study(swimmer).poses(m, None, np.array([0.3, 0.6]))
+        SceneTables(swimmer).poses(m, None, np.array([0.3, 0.6]))
         for m in ("adapted", "direct")
     )
     np.testing.assert_allclose(adapted[:, 2], direct[:, 2], atol=1e-3)
@@ -162,7 +162,7 @@ def test_a_net_turn_leaves_nothing_to_commute():
     exact = direct(viscous.system.velocity, TURNING, a)
     assert np.abs(exact[:, 2]).max() > 0.2
     tables = [
-        Study(viscous.with_numerics(curves=int(n))).poses("adapted", TURNING, a)
+        SceneTables(viscous.with_numerics(curves=int(n))).poses("adapted", TURNING, a)
         for n in counts
     ]
     errors = [np.abs(found - exact).max() for found in tables]
@@ -353,7 +353,7 @@ def test_look_up_estimates_cover_the_truth(truths):
             "estimates", exact, some.system.medium, some.system.body, some.gait, a
         )
         table = tabled(
-            Study(some).displacements(a, [m for m in TIERS if m != "direct"])
+            SceneTables(some).displacements(a, [m for m in TIERS if m != "direct"])
         )
         for tier, error in table["estimate"].items():
             estimates.append(np.stack([error, table["estimate_heading"][tier]], -1))
@@ -407,7 +407,7 @@ class Known(Swimmer):
 def test_a_table_without_a_length_has_that_of_its_body():
     body = Chain(length=0.3)
     made, found = (
-        Study(Scene(kind(Viscous(2.0), body), Circle(), Numerics(grid=5))).fitted
+        SceneTables(Scene(kind(Viscous(2.0), body), Circle(), Numerics(grid=5))).fitted
         for kind in (Swimmer, Known)
     )
     assert len(found.axes[0]) == 4 and (found.length, found.unit) == (
@@ -430,7 +430,7 @@ def test_a_tier_is_one_expression(monkeypatch):
     )
     monkeypatch.setitem(TIERS._parts, "leading", leading)
     scene, counts = GLASS.with_numerics(grid=9), []
-    study = Study(scene)
+    study = SceneTables(scene)
     foretold = study.cost([0.05, 1.0], ["path", "leading", "direct"]).balances
     with listening(lambda samples, points, linear: counts.append(samples)):
         table = tabled(study.displacements([0.05, 1.0], ["path", "leading", "direct"]))
@@ -448,7 +448,7 @@ def test_a_tier_is_one_expression(monkeypatch):
         Refusal,
         match="the leading tier takes a body of joints, this body has 4: use direct",
     ):
-        Study(
+        SceneTables(
             scenes.load("seven-link-wave").changed(
                 body=Chain((1,) * 5), gait=Wave(joints=4)
             )
@@ -530,7 +530,7 @@ def test_what_the_solver_left_counts_in_the_estimate():
         assert left.min() > 10 * tight.max()
         assert (error >= left).all()
         off = estimate.pose_distance(
-            poses, Study(sized).poses("direct", None, a), length
+            poses, SceneTables(sized).poses("direct", None, a), length
         )
         assert (error >= off).all()
         np.testing.assert_allclose(error[:, :1], left, rtol=0.9)
@@ -592,7 +592,7 @@ def test_estimates_are_in_body_lengths_and_in_tables_in_the_unit_of_their_poses(
     np.testing.assert_allclose(same, error, rtol=1e-6)
     np.testing.assert_allclose(small[:, :2], 1e-6 * poses[:, :2], rtol=1e-9)
     tables = [
-        tabled(Study(s.with_numerics(grid=9)).displacements(a, ["path"]))
+        tabled(SceneTables(s.with_numerics(grid=9)).displacements(a, ["path"]))
         for s in (GLASS, tiny)
     ]
     for key, size in (

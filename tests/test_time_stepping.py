@@ -13,7 +13,7 @@ from geomech.scenes import Scene
 from geomech.studies import estimate, tiered, undulation
 from geomech.studies.batch import side_by_side
 from geomech.studies.choose import cheapest
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems import Swimmer
 from rft import (
     CATALOGUE,
@@ -309,7 +309,7 @@ def test_cycles_that_do_not_repeat_are_not_taken_for_periodic():
     wanted = time_steps(
         GLASS, slow.system.body, alpha, alphadot, effects=slow.system.effects, cycles=1
     ).displacement
-    np.testing.assert_allclose(Study(slow).poses("direct"), wanted, atol=1e-12)
+    np.testing.assert_allclose(SceneTables(slow).poses("direct"), wanted, atol=1e-12)
 
 
 def test_a_tolerance_below_what_time_stepping_repeats_to_is_refused():
@@ -433,7 +433,7 @@ def periodic(effects, gait, body, phases, amplitudes):
     scene = SANDFISH.changed(body=body, effects=effects, gait=gait).with_numerics(
         phases=phases
     )
-    return Study(scene).poses("direct", None, amplitudes)
+    return SceneTables(scene).poses("direct", None, amplitudes)
 
 
 def test_estimates_of_marches_cover_the_truth(truths):
@@ -499,7 +499,7 @@ def second_cycle(medium, body, gait, effects, pieces, phases, amplitudes):
     """Poses after the second cycle."""
     scene = Scene(Swimmer(medium, body, effects), gait)
     scene = scene.with_numerics(pieces=pieces, phases=phases, tolerance=1e-9, cycles=2)
-    return Study(scene).poses("direct", None, amplitudes)
+    return SceneTables(scene).poses("direct", None, amplitudes)
 
 
 def errors_over_estimates(scene, pieces, phases, finer, truths):
@@ -559,7 +559,7 @@ def test_a_tolerance_refines_pieces_or_is_refused(monkeypatch):
     scene = scene.with_numerics(pieces=5)
     found = tabled(cheapest(scene, [1.2], 1e-5))
     assert found["settings"]["pieces"] > 5
-    truth = Study(scene.with_numerics(pieces=640)).poses("direct", None, [1.2])
+    truth = SceneTables(scene.with_numerics(pieces=640)).poses("direct", None, [1.2])
     off = estimate.distance(np.array(found[found["tier"]]), truth)
     assert (off <= found["estimate"][found["tier"]]).all()
     assert max(found["estimate"][found["tier"]]) <= 1e-5
@@ -579,11 +579,13 @@ def test_a_setting_for_pieces():
     assert tiered.applies(setting, depth)
     assert not tiered.applies(setting, depth.changed(effects=()))
     a = np.linspace(0.5, 1.5, 8)
-    far = Study(depth.with_numerics(pieces=320, phases=64)).poses("direct", Circle(), a)
+    far = SceneTables(depth.with_numerics(pieces=320, phases=64)).poses(
+        "direct", Circle(), a
+    )
     coarse = [
-        Study(tiered.Settings(depth.with_numerics(phases=64)).at(setting, n)).poses(
-            "direct", Circle(), a
-        )
+        SceneTables(
+            tiered.Settings(depth.with_numerics(phases=64)).at(setting, n)
+        ).poses("direct", Circle(), a)
         for n in setting.values
     ]
     errors = [np.sqrt(np.mean(estimate.distance(x, far) ** 2)) for x in coarse]

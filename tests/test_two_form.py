@@ -11,7 +11,7 @@ from geomech.geometry.connection import Connection
 from geomech.geometry.two_form import spanned, two_form
 from geomech.io.results import to_xarray
 from geomech.studies import fields
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems import Swimmer, Table
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
@@ -136,7 +136,9 @@ def test_pairs_are_drawn(form):
 
 
 def test_the_file_has_all_pairs(form, tmp_path):
-    study = Study(geomech.Scene(SYSTEM, GAIT, geomech.Numerics(grid=7, extent=1.2)))
+    study = SceneTables(
+        geomech.Scene(SYSTEM, GAIT, geomech.Numerics(grid=7, extent=1.2))
+    )
     fields.save_connection(tmp_path / "made.nc", study)
     assert np.array_equal(Connection.load(tmp_path / "made.nc").A, study.fitted.A)
     saved = to_xarray(fields.of_study(study))["ccf_pairs"]
@@ -183,7 +185,9 @@ def test_the_file_has_all_pairs(form, tmp_path):
     ],
 )
 def test_a_file_with_pairs_that_are_none_is_refused(name, spoilt, said, tmp_path):
-    study = Study(geomech.Scene(SYSTEM, GAIT, geomech.Numerics(grid=5, extent=1.2)))
+    study = SceneTables(
+        geomech.Scene(SYSTEM, GAIT, geomech.Numerics(grid=5, extent=1.2))
+    )
     fields.save_connection(tmp_path / "a.nc", study)
     assert Table(tmp_path / "a.nc").joints == 3
     with xarray.open_dataset(tmp_path / "a.nc", engine="scipy") as file:

@@ -22,8 +22,8 @@ from geomech.geometry.field import Field
 from geomech.scenes import IntruderScene, MeshScene, Numerics, Scene, WalkerScene, kinds
 from geomech.studies import sweep, undulation
 from geomech.studies.choose import cheapest
+from geomech.studies.scene_tables import SceneTables
 from geomech.studies.single import single
-from geomech.studies.study import Study
 from geomech.systems import Solver, Swimmer
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
@@ -221,8 +221,8 @@ def geometries(value):
     yield "a list", lambda: swept_table(sweep.sweep(plain, {"gait.amplitude": value}))
     yield "a list", lambda: tabled(cheapest(plain, value, 0.1))
     yield "gait of the scene", lambda: tabled(cheapest(plain, [1.0], 0.1, value))
-    yield "gait of the scene", lambda: Study(plain).table("adapted", value)
-    yield "tier", lambda: Study(plain).plan(value)
+    yield "gait of the scene", lambda: SceneTables(plain).table("adapted", value)
+    yield "tier", lambda: SceneTables(plain).plan(value)
     yield "system", lambda: plain.changed(system=value)
     yield "one shape", lambda: single(plain.system, value, [1, 0])
     for tier in (path, direct):
@@ -235,10 +235,10 @@ def geometries(value):
     yield "gait", lambda: family.fit(velocity, value, 1.0)
     yield "largest", lambda: family.fit(velocity, Circle(), value)
     yield "curves", lambda: family.fit(velocity, Circle(), 1.0, value)
-    yield "gait of the scene", lambda: Study(plain).poses("direct", value)
-    yield "tier", lambda: Study(plain).poses(value)
-    yield "amplitudes", lambda: Study(plain).poses("direct", amplitudes=value)
-    for ask in (Study(plain).displacements, Study(plain).cost):
+    yield "gait of the scene", lambda: SceneTables(plain).poses("direct", value)
+    yield "tier", lambda: SceneTables(plain).poses(value)
+    yield "amplitudes", lambda: SceneTables(plain).poses("direct", amplitudes=value)
+    for ask in (SceneTables(plain).displacements, SceneTables(plain).cost):
         yield "gait of the scene", lambda ask=ask: ask([1.0], ["direct"], value)
         yield "amplitudes of a study", lambda ask=ask: ask(value, ["direct"])
         yield "tiers", lambda ask=ask: ask([1.0], value)

@@ -14,7 +14,7 @@ from geomech.io.results import of_dict
 from geomech.scenes import Scene
 from geomech.studies import sweep, uncertainty
 from geomech.studies.choose import cheapest
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.studies.tables import QUANTITIES, of_pose
 from geomech.systems import Swimmer, capability
 from geomech.systems.capabilities import Uncertain
@@ -82,7 +82,7 @@ def test_in_a_frame_that_depends_on_the_medium_media_have_their_own(monkeypatch)
     monkeypatch.setattr(uncertainty, "PHASES", 16)
     sand, amplitudes = scene(granular()).with_numerics(grid=7), np.array([0.7, 1.2])
     in_frame = lambda system: (
-        Study(sand.changed(system=system)).in_frame("minimum-perturbation").scene
+        SceneTables(sand.changed(system=system)).in_frame("minimum-perturbation").scene
     )
     told = uncertainty.of_medium(in_frame(sand.system), GAIT, amplitudes)
     media = whitened(12, 2, seed=2) @ uncertainty.root(COVARIANCE).T
@@ -176,7 +176,7 @@ def test_wide_media_shift_the_mean_and_it_is_told(monkeypatch):
         assert told["shift"]["net_distance"][0] == pytest.approx(
             shift, abs=0.03 * nets.std()
         )
-        tables[share] = Study(sand).displacements([1.2], ["direct"])
+        tables[share] = SceneTables(sand).displacements([1.2], ["direct"])
         errors[share] = told["shift"]["net_distance"][0] / told["net_distance"][0]
     assert errors[1.0] < -0.3 and -uncertainty.SHIFTED < errors[0.1] < 0
     wide, narrow = (str(tables[share]) for share in (1.0, 0.1))
@@ -217,7 +217,7 @@ def test_roots():
 
 def test_every_tier_has_it_beside_its_own_error():
     sand = scene(granular()).with_numerics(grid=7, phases=64)
-    table = tabled(Study(sand).displacements([0.5, 1.0], ["area", "direct"]))
+    table = tabled(SceneTables(sand).displacements([0.5, 1.0], ["area", "direct"]))
     told = uncertainty.of_medium(sand, GAIT, np.array([0.5, 1.0]))
     for tier in ("area", "direct"):
         np.testing.assert_allclose(table["medium_error"][tier], told["position"])
@@ -226,7 +226,7 @@ def test_every_tier_has_it_beside_its_own_error():
         q: told[q].tolist() for q in QUANTITIES
     }
     plain = tabled(
-        Study(sand.changed(medium=Granular(1.49, 0.22))).displacements(
+        SceneTables(sand.changed(medium=Granular(1.49, 0.22))).displacements(
             [0.5, 1.0], ["area", "direct"]
         )
     )
@@ -237,7 +237,7 @@ def test_every_tier_has_it_beside_its_own_error():
     answer = cheapest(sand, [0.5, 1.0], 1e-2)
     spread = np.hypot(answer["x"].spread, answer["y"].spread)
     np.testing.assert_allclose(spread[0], told["position"])
-    shown = str(Study(sand).displacements([0.5, 1.0], ["area", "direct"]))
+    shown = str(SceneTables(sand).displacements([0.5, 1.0], ["area", "direct"]))
     assert shown.count("+- medium") > 1
     assert "medium: one standard deviation by its covariance" in shown
     assert "mean over the media: " in shown
@@ -269,8 +269,8 @@ def test_it_costs_what_is_told():
     sand = scene(granular()).with_numerics(phases=64)
     certain = sand.changed(medium=Granular(1.49, 0.22))
     more = (
-        Study(sand).cost([1.0, 1.5], ["direct"]).balances
-        - Study(certain).cost([1.0, 1.5], ["direct"]).balances
+        SceneTables(sand).cost([1.0, 1.5], ["direct"]).balances
+        - SceneTables(certain).cost([1.0, 1.5], ["direct"]).balances
     )
     assert (
         more
@@ -288,7 +288,7 @@ def test_a_covariance_that_reaches_no_medium_is_refused_before_computing(
         Refusal,
         match=r"sand: \[medium\] covariance: a standard deviation away there is no medium \(C ",
     ):
-        tabled(Study(wide).displacements([1.0], ["direct"]))
+        tabled(SceneTables(wide).displacements([1.0], ["direct"]))
     with pytest.raises(Refusal, match="there is no medium"):
         cheapest(wide, [1.0], 1e-2)
     with pytest.raises(Refusal, match="there is no medium"):

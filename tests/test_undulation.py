@@ -15,7 +15,7 @@ from geomech.gaits import Circle, Fourier, Sine, Wave
 from geomech.geometry.reconstruct import displacement
 from geomech.scenes import Scene
 from geomech.studies import undulation
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems import Swimmer
 from rft import (
     CATALOGUE,
@@ -269,11 +269,11 @@ def test_long_bodies_approach_the_endless_wave():
 
 def test_serpenoid_has_a_connection_and_a_ccf():
     swimmer = scenes.load("serpenoid-glass").with_numerics(grid=15)
-    table = tabled(Study(swimmer).displacements([6.0]))
+    table = tabled(SceneTables(swimmer).displacements([6.0]))
     direct = np.hypot(*table["direct"][0][:2])
     assert direct > 0.1
     assert np.hypot(*table["harmonic"][0][:2]) == pytest.approx(direct, rel=0.05)
-    backwards = Study(swimmer).poses("direct", Circle(amplitude=6.0))
+    backwards = SceneTables(swimmer).poses("direct", Circle(amplitude=6.0))
     np.testing.assert_allclose(backwards[0], -table["direct"][0][0], rtol=0.05)
 
 

@@ -39,7 +39,7 @@ from geomech.run.runner import Runner, runner, use_runner
 from geomech.run.workers import using
 from geomech.scenes import kinds
 from geomech.studies import cycles, sweep, tiered
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from rft.balance import backend
 from rft.core import threads as threaded
 from rft.core.refusal import Refusal
@@ -275,7 +275,7 @@ def test_fields_have_the_same_digits_whoever_computes(two, given_away, monkeypat
     ):
 
         def ask():
-            study = Study(scene)
+            study = SceneTables(scene)
             study.compute_metric()
             return study.fitted.A, study.fitted.residual, study.metric
 

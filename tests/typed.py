@@ -26,7 +26,7 @@ from geomech.scenes import (
 )
 from geomech.studies import cost, undulation
 from geomech.studies.choose import cheapest
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.studies.sweep import sweep
 from geomech.systems import NoSlipSnake, Swimmer
 from geomech.systems.base import integrated
@@ -99,7 +99,7 @@ def geometry() -> list[Any]:
 def scenes() -> list[Any]:
     scene: Scene = geomech.load("three-link-viscous").with_numerics(grid=7, phases=32)
     text: str = toml(scene.changed(gait=Circle(amplitude=0.3)))
-    study: Study = geomech.Study(scene).tables
+    study: SceneTables = geomech.Study(scene).tables
     net: Array = study.poses("area", amplitudes=[0.5])
     face = geomech.study("three-link-viscous", grid=7, phases=32)
     numbers: Result = face.displacement([0.5], tiers="area")

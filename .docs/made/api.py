@@ -16,7 +16,7 @@ PACKAGES = {
     "From scene to result": [
         "geomech",
         "geomech.scenes",
-        "geomech.studies.study",
+        "geomech.studies.scene_tables",
         "geomech.gaits",
         "geomech.systems",
         "geomech.tiers",

@@ -10,7 +10,7 @@ import numpy as np
 from geomech.geometry import metric
 from geomech.optimisation.cycles import Phases, Runs
 from geomech.optimisation.request import Request
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems.base import body_size
 
 
@@ -35,7 +35,7 @@ def build_tables(request: Request) -> tuple:
     """Return the harmonics of the velocity on a grid, and the norm of the cost of
     moving; None in its place if the objective has no cost."""
     scene = request.scene.changed(system=request.system)
-    study = Study(scene).with_numerics(extent=request.extent)
+    study = SceneTables(scene).with_numerics(extent=request.extent)
     harmonics = study.compute_harmonics()
     if not request.objective.costs:
         return harmonics, None

@@ -13,7 +13,7 @@ from geomech.optimisation.evaluate import Evaluation
 from geomech.optimisation.gain import Gained, gained_ccf
 from geomech.optimisation.request import Request
 from geomech.scenes.model import Scene
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems.capabilities import stored_table
 
 
@@ -71,8 +71,8 @@ class Optimum:
         return scene.with_numerics(extent=extent)
 
     @cached_property
-    def study(self) -> Study:
-        return Study(self.scene)
+    def study(self) -> SceneTables:
+        return SceneTables(self.scene)
 
     @cached_property
     def gained(self) -> Gained | None:

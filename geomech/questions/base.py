@@ -20,7 +20,7 @@ from geomech.results.kinds import Plain
 if TYPE_CHECKING:
     from geomech.core.variables import Result
     from geomech.run.cost import Cost
-    from geomech.studies.study import Study
+    from geomech.studies.scene_tables import SceneTables
 
 Progress = Callable[[float], None]
 Allow = Callable[[Any], None]
@@ -86,13 +86,13 @@ class Run:
             return None
         return self.progress
 
-    def tables_of(self, scene: Any) -> "Study":
+    def tables_of(self, scene: Any) -> "SceneTables":
         """Return the tables of a scene: those that are given, or new ones."""
-        from geomech.studies.study import Study
+        from geomech.studies.scene_tables import SceneTables
 
         if self.tables is not None and self.tables.scene is scene:
             return self.tables
-        return Study(scene)
+        return SceneTables(scene)
 
 
 # By field: what it means, its type, its default.

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from geomech.core.variables import Result
     from geomech.run.cost import Cost
     from geomech.scenes.model import Scene
+    from geomech.studies.scene_tables import SceneTables
     from geomech.studies.shape_space import Plan
-    from geomech.studies.study import Study
 
 SHOWN = ("A",)
 
@@ -61,12 +61,12 @@ def with_contents(result: "Result", ending: str, layout: str | None = None) -> "
     from geomech.io.tables import FORMATS
     from geomech.results.scenes import scene_of
     from geomech.studies.fields import CONTENTS, contents
-    from geomech.studies.study import Study
+    from geomech.studies.scene_tables import SceneTables
 
     kind = contents(FORMATS[ending], layout)
     if kind in result.attributes.get("contents", "").split():
         return result
-    more = CONTENTS[kind](Study(scene_of(result)))
+    more = CONTENTS[kind](SceneTables(scene_of(result)))
     facts = {**result.attributes, **more.attributes}
     return replace(result.with_variables(*more.variables), attributes=facts)
 
@@ -150,7 +150,7 @@ class Connection(Question):
         if self.sliced and self.compare_frame is not None:
             raise Refusal(
                 "``compare_frame`` draws maps of two joints",
-                instead="drop it, or see ``Study.ccf(pair=...)``",
+                instead="drop it, or see ``SceneTables.ccf(pair=...)``",
             )
         self.plan.check()
 
@@ -314,7 +314,7 @@ def cost_variables(balances: int, seconds: float) -> list[Any]:
     ]
 
 
-def facts_of(tables: "Study") -> dict[str, Any]:
+def facts_of(tables: "SceneTables") -> dict[str, Any]:
     """Return which entries of A follow from others, and whether its fit is exact."""
     from geomech.systems.capabilities import stored_table
 

@@ -1,5 +1,5 @@
-"""A scene: what is simulated and how finely. It is a value; `geomech.studies.bench.Study` stores what is computed for
-one."""
+"""A scene: what is simulated and how finely. It is a value;
+`geomech.studies.scene_tables.SceneTables` stores what is computed for one."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ from geomech.geometry.gait import Gait
 from geomech.geometry.harmonics import Harmonics, basis
 from geomech.geometry.reconstruct import displacement
 from geomech.scenes.model import Scene
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems.base import body_size
 from geomech.systems.capabilities import Drawable, capability
 from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
@@ -255,7 +255,7 @@ def refuse(scene: Scene) -> None:
 def chart(scene: Scene) -> Chart:
     """Return the chart of a scene. Refusal for one without harmonics, or without a body to draw."""
     refuse(scene)
-    study = Study(scene)
+    study = SceneTables(scene)
     fitted, series = study.fitted, _series(study)
     frames = {scene.frame: _frame(fitted)}
     if scene.frame != MINIMUM_PERTURBATION:
@@ -271,7 +271,7 @@ def chart(scene: Scene) -> Chart:
     return replace(made, grid_error=_grid_error(series))
 
 
-def _series(study: Study) -> Harmonics:
+def _series(study: SceneTables) -> Harmonics:
     """Return the harmonics of a scene without those that are next to nothing; where xi = A alphadot, A alone."""
     if study.scene.system.traits.linear:
         A = study.fitted

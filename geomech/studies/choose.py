@@ -26,7 +26,7 @@ from geomech.studies.estimate import (
     in_groups,
     pose_distance,
 )
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems.base import body_size
 from geomech.systems.capabilities import pieces_per_length, settling, solver_of
 from geomech.tiers.base import solved_phases
@@ -45,7 +45,7 @@ def cheapest(
     gait: Gait | None = None,
     ask: Callable = lambda jobs: None,
 ) -> Result:
-    """Return displacements as `Study.displacements` does for the cheapest tier with errors
+    """Return displacements as `SceneTables.displacements` does for the cheapest tier with errors
     of position of at most ``tol`` body lengths, with the settings chosen_phases,
     chosen_pieces or chosen_grid.
 
@@ -54,7 +54,7 @@ def cheapest(
     (`geomech.studies.cost`) before each. Refusal if no tier is accurate enough."""
     if not (is_number(tol) and 0 < tol <= 1e300):
         raise Refusal("``tolerance`` must be a number > 0 in body lengths", value=tol)
-    study, start = Study(scene), time.perf_counter()
+    study, start = SceneTables(scene), time.perf_counter()
     system, gait = scene.system, checked_gait(scene.gait if gait is None else gait)
     amplitudes = real_array("amplitudes", amplitudes)
     if amplitudes.ndim != 1 or not amplitudes.size:

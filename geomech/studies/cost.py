@@ -2,7 +2,7 @@
 
 Balances are counted as tiers and estimates (`geomech.studies.estimate`) need them; where time stepping goes on until
 cycles repeat, their number is assumed. Seconds are those of `geomech.run.cost`. From Python nothing is refused: see
-`Study.cost`."""
+`SceneTables.cost`."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def study(
     gait: Gait | None = None,
     tables: bool = True,
 ) -> list[Job]:
-    """Return the jobs of `Study.study` for ``count`` amplitudes of a gait, or the scene's own, by plans of tiers;
+    """Return the jobs of `SceneTables.study` for ``count`` amplitudes of a gait, or the scene's own, by plans of tiers;
     without tables if these are stored."""
     gait, phases = gait or scene.gait, scene.numerics.phases
     jobs, names = [], set()
@@ -243,7 +243,7 @@ def built(scene: Scene, table: Table, numbers: int = 0) -> list[Job]:
 
 
 def of_even_part(scene: Scene) -> list[Job]:
-    """Return the jobs of the even part of the velocity (`Study.even_part`): at a few shapes, and at all where it is not
+    """Return the jobs of the even part of the velocity (`SceneTables.even_part`): at a few shapes, and at all where it is not
     odd."""
     system = scene.system
     if stored_table(system, "connection"):
@@ -260,7 +260,7 @@ def of_even_part(scene: Scene) -> list[Job]:
 def of_planes(
     scene: Scene, pairs: Sequence[tuple[int, int]], at: Sequence
 ) -> list[Job]:
-    """Return the jobs of planes of pairs of joints through shapes (`Study.plane`)."""
+    """Return the jobs of planes of pairs of joints through shapes (`SceneTables.plane`)."""
     balances = [
         fitted.plane_balances(scene.system, scene.numerics, *one)
         for one in zip(pairs, at)
@@ -269,7 +269,7 @@ def of_planes(
 
 
 def of_metric(scene: Scene) -> list[Job]:
-    """Return the jobs of the metric, with the harmonic table where they share velocities (`Study.compute_metric`)."""
+    """Return the jobs of the metric, with the harmonic table where they share velocities (`SceneTables.compute_metric`)."""
     system, n = scene.system, scene.numerics
     if stored_table(system, "metric"):
         return []

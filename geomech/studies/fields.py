@@ -26,7 +26,7 @@ from geomech.io.tables.netcdf import SHAPE
 from geomech.scenes import toml
 from geomech.scenes.model import Scene
 from geomech.studies import effort
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.studies.tables import COMPONENTS
 from geomech.systems.base import System, body_size, length_unit, shape_labels
 from geomech.systems.capabilities import (
@@ -45,7 +45,7 @@ INTERVAL_OF_CCF = "half width of the interval of ccf"
 INTERVAL_OF_A = "half width of the interval of A"
 
 
-def of_study(study: Study) -> Result:
+def of_study(study: SceneTables) -> Result:
     """Return A (component, joint, alpha_1, ...), its fit residual, the rms of xi, and the CCF with its estimated error,
     of each pair of joints; for two joints, where xi is not linear in alphadot, its odd harmonics; the metric, where
     there is one.
@@ -60,7 +60,7 @@ def of_study(study: Study) -> Result:
     )
 
 
-def of_fitted_study(study: Study) -> Result:
+def of_fitted_study(study: SceneTables) -> Result:
     """Return A, its fit residual and the rms of xi, with the conventions of a study."""
     labels = shape_labels(study.scene.system)
     found = of_connection(study.fitted, stored_table(study.scene.system, "A_error"))
@@ -68,7 +68,7 @@ def of_fitted_study(study: Study) -> Result:
     return Result("connection", (*axes, *found), attributes(study))
 
 
-def of_fit(study: Study) -> list[Variable]:
+def of_fit(study: SceneTables) -> list[Variable]:
     """Return the share of the rms of xi that the linear fit leaves and the share of A that
     more directions change, by component, and the number of singular shapes."""
     fitted = study.fitted
@@ -101,7 +101,7 @@ def _row_shares(error: np.ndarray, A: np.ndarray) -> np.ndarray:
         return np.sqrt(np.nanmean(error**2, axes) / np.nanmean(A**2, axes))
 
 
-def of_connection_alone(study: Study) -> Result:
+def of_connection_alone(study: SceneTables) -> Result:
     """Return what `of_study` has of A, its errors and its axes, and of a metric that is a quadratic form."""
     labels = shape_labels(study.scene.system)
     variables = of_connection(
@@ -118,7 +118,7 @@ def of_connection_alone(study: Study) -> Result:
     )
 
 
-def of_struct(study: Study) -> Result:
+def of_struct(study: SceneTables) -> Result:
     """Return what sysplotter's struct s has of a connection of two joints: that of `of_connection_alone`, the same in
     minimum-perturbation coordinates, the pose of their frame, and CCFs with their part dA."""
     alone, fitted = of_connection_alone(study), study.fitted
@@ -153,7 +153,7 @@ def contents(file: Callable, layout: str | None = None) -> str:
     )
 
 
-def save_connection(path: str | Path, study: Study, **settings: str) -> None:
+def save_connection(path: str | Path, study: SceneTables, **settings: str) -> None:
     """Write the connection of a study in the format that the ending names, with ``settings`` that it takes; the file appears
     whole or not at all."""
     file = FORMATS[Path(path).suffix]
@@ -184,7 +184,7 @@ def check_joints(scene: Scene, file: Callable | None) -> None:
         )
 
 
-def attributes(study: Study) -> dict:
+def attributes(study: SceneTables) -> dict:
     """Return title, conventions, numerics and text of a scene, as attributes of a file of its connection."""
     scene = study.scene
     numerics = (
@@ -215,7 +215,7 @@ def text_of(scene: Scene) -> dict[str, str]:
         return {}
 
 
-def variables(study: Study) -> list[Variable]:
+def variables(study: SceneTables) -> list[Variable]:
     """Return the fields of a study, without their coordinates."""
     unit = length_unit(study.scene.system)
     variables = of_connection(study.fitted, stored_table(study.scene.system, "A_error"))
@@ -237,7 +237,7 @@ def variables(study: Study) -> list[Variable]:
     return variables + of_even_part(study)
 
 
-def of_even_part(study: Study) -> list[Variable]:
+def of_even_part(study: SceneTables) -> list[Variable]:
     """Return the part of the velocity that is even in alphadot, if there is one."""
     if (even := study.even_part) is None:
         return []

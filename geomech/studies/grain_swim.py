@@ -16,7 +16,7 @@ from geomech.run.backend import prefer_backend
 from geomech.scenes.model import Scene
 from geomech.studies.calibration import rod_fit
 from geomech.studies.grains import GrainSteps, price, store_folder
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems.base import body_size
 from geomech.systems.swimmer import Swimmer
 from rft.bodies.links import Links
@@ -148,7 +148,7 @@ class GrainSwim:
     def answer(self, progress: Progress) -> Result:
         """Return the displacement by every tier and in grains, and the motion in time."""
         # Before the grains: a scene that no tier takes is refused at once.
-        balances = Study(self.scene).cost([self.scene.gait.amplitude]).as_balances
+        balances = SceneTables(self.scene).cost([self.scene.gait.amplitude]).as_balances
         with prefer_backend(balances):
             tiers = predictions(self)
         run = self.experiment.run(store_folder(self.store), progress)
@@ -292,7 +292,7 @@ def _predicted(
     scene: Scene, tiers: tuple[str, ...] | None = None
 ) -> Iterator[tuple[str, Predicted]]:
     """Yield (tier, its prediction) of a scene's own gait."""
-    table = Study(scene).displacements([scene.gait.amplitude], tiers)
+    table = SceneTables(scene).displacements([scene.gait.amplitude], tiers)
     length = table.attributes["body_length"]
     units = np.array([length, length, 1.0])
     for tier in table["tier"].values.tolist():

@@ -15,7 +15,7 @@ from geomech.run.cost import Cost
 from geomech.scenes.model import Scene
 from geomech.studies import fields
 from geomech.studies.cost import connection, cycles_of, direct, price
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.studies.tables import COMPONENTS, POSE, zero_words
 from geomech.systems.base import body_size, length_unit, shape_labels
 from geomech.systems.capabilities import (
@@ -78,7 +78,9 @@ def is_mapped(scene: Scene) -> bool:
     return scene.system.joints == 2 and PATH.is_offered(scene.system)
 
 
-def answer(tables: Study, cycles: int, mapped: bool, progress: Any = None) -> Result:
+def answer(
+    tables: SceneTables, cycles: int, mapped: bool, progress: Any = None
+) -> Result:
     """Return so many cycles of a scene's motion as a result.
 
     mapped: with the CCF, on which a picture shows the shapes, of a scene that has one."""
@@ -157,7 +159,7 @@ def ends(points: np.ndarray | None, unit: str) -> list[Variable]:
     return found
 
 
-def of_map(tables: Study) -> list[Variable]:
+def of_map(tables: SceneTables) -> list[Variable]:
     """Return the CCF with its error over axes of its own names, as the shapes of a motion
     are over phase."""
     ccf = fields.of_ccf(tables.curvature, tables.curvature_error)

@@ -18,7 +18,7 @@ from geomech.studies import effort, fields, shape_space
 from geomech.studies.available import default_tiers
 from geomech.studies.cost import Job, of_even_part, of_metric, of_planes, price
 from geomech.studies.cost import study as jobs
-from geomech.studies.study import Study
+from geomech.studies.scene_tables import SceneTables
 from geomech.systems.base import System, refuse_singular
 from geomech.systems.capabilities import near_gait
 from geomech.systems.swimmer import is_three_link
@@ -39,7 +39,7 @@ OF_GAITS = ("frequency", "error_is", "gait", "other_gaits")
 OF_ALL = ("frame", "body_length", "length_unit", "frequency", "scene_toml")
 
 
-def answer(tables: Study, progress: Callable | None = None) -> Result:
+def answer(tables: SceneTables, progress: Callable | None = None) -> Result:
     """Return the study of a scene as a result: displacements of its gait, those of other
     gaits under names such as circle_x, and the fields of shape space, where all of it can
     be drawn; of three joints with the planes of every pair."""
@@ -65,7 +65,7 @@ def answer(tables: Study, progress: Callable | None = None) -> Result:
     return Result("run", tuple(found), facts)
 
 
-def of_pairs(tables: Study, known: set[str]) -> list[Variable]:
+def of_pairs(tables: SceneTables, known: set[str]) -> list[Variable]:
     """Return the planes of all pairs of three joints, without variables that are known."""
     planes = [tables.plane(pair) for pair in combinations(range(3), 2)]
     found = [
@@ -168,7 +168,7 @@ def is_mapped(system: System) -> bool:
 
 def cost(scene: Scene) -> Cost:
     """Return the cost of a report; Refusal as in the report itself."""
-    study, system = Study(scene), scene.system
+    study, system = SceneTables(scene), scene.system
     parts: list[Job] = []
     for k, gait in enumerate(compared(scene)):
         amplitudes = reachable(scene, gait)

@@ -32,7 +32,7 @@ from geomech.studies.cost import connection as fitted
 from geomech.studies.cost import study as displacement
 from geomech.studies.effort import shared, why_none
 from geomech.studies.fields import WHOLE, has_matrix
-from geomech.studies.study import Study, refuse_outside
+from geomech.studies.scene_tables import SceneTables, refuse_outside
 from geomech.studies.tables import COMPONENTS, POSE
 from geomech.systems.capabilities import stored_table
 from geomech.tiers.area import AREA
@@ -53,8 +53,8 @@ class Space(NamedTuple):
     effort. enclosed: the displacement of the scene's gait by the area tier. balances,
     seconds: of the computation."""
 
-    study: Study
-    other: Study | None
+    study: SceneTables
+    other: SceneTables | None
     planes: tuple[Plane, ...]
     other_planes: tuple[Plane, ...]
     stretch: Stretch | None
@@ -74,7 +74,7 @@ class Plan:
     of changes of shape. stretch: with shape space stretched to that cost. gait: the
     scene's gait is drawn, and must lie within. other_frame: name of another body frame."""
 
-    study: Study
+    study: SceneTables
     file: str = ""
     field: bool = True
     mapped: bool = False
@@ -99,7 +99,7 @@ class Plan:
         return "ask for less"
 
     @cached_property
-    def other(self) -> Study | None:
+    def other(self) -> SceneTables | None:
         """Tables in the other frame."""
         if self.other_frame is None:
             return None
@@ -167,7 +167,7 @@ class Plan:
                 ]
             )
 
-    def _jobs(self, study: Study) -> list[Job]:
+    def _jobs(self, study: SceneTables) -> list[Job]:
         scene = study.scene
         jobs = [*of_planes(scene, *zip(*self.at)), *frame(scene)] if self.at else []
         if not self.field:

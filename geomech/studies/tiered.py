@@ -17,8 +17,8 @@ from geomech.scenes.model import Scene, checked_scene
 from geomech.studies import cost as foretold
 from geomech.studies import estimate
 from geomech.studies.available import tiers
+from geomech.studies.scene_tables import SceneTables, refuse_outside
 from geomech.studies.settings import Choice, Measured, cheapest
-from geomech.studies.study import Study, refuse_outside
 from geomech.systems.base import body_size
 from geomech.systems.capabilities import (
     is_closed,
@@ -153,7 +153,7 @@ class Settings:
     def numbers(self, setting: Setting | None, value: Any) -> list[np.ndarray]:
         """Return net poses (B, 3), with tables built anew so that their cost is counted."""
         tier = setting.tier if setting else DIRECT.name
-        return [Study(self.at(setting, value)).poses(tier, None, self.amplitudes)]
+        return [SceneTables(self.at(setting, value)).poses(tier, None, self.amplitudes)]
 
     def errors(
         self, numbers: list[np.ndarray], truth: list[np.ndarray]

@@ -1,4 +1,5 @@
-"""The study of a scene: displacements by every tier, with a store of the tables computed so far."""
+"""The tables of a scene: displacements by every tier, and what is computed for them, each
+table once."""
 
 from __future__ import annotations
 
@@ -41,9 +42,10 @@ FEW_PHASES = 4096  # that tell whether a gait is far from leaving the field
 SAMPLES = 64, FEW_PHASES  # amplitudes and phases that `cost` checks, of all
 
 
-class Study:
-    """A scene and the tables computed for it so far, each stored under its name, the system and all other data that it
-    depends on. `with_numerics` returns a study with other numerics that shares them."""
+class SceneTables:
+    """A scene and the tables computed for it so far, each stored under its name, the system
+    and all other data that it depends on. `with_numerics` returns those of the scene with
+    other numerics, which shares them. `geomech.Study` asks them."""
 
     def __init__(self, scene: Scene, tables: dict | None = None):
         if not isinstance(scene, Scene):
