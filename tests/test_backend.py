@@ -537,6 +537,7 @@ def test_code_on_disk_is_that_of_the_formulas():
     assert paths(2.0) == two
 
 
+@pytest.mark.timeout(900)  # the oldest numba compiles for minutes
 @pytest.mark.usefixtures("compiled_code")
 def test_made_beforehand(capsys):
     """As the whole suite begins (conftest.py)."""
