@@ -1,7 +1,7 @@
 """What several questions make their results with."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import fields, replace
+from dataclasses import fields
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -93,17 +93,6 @@ def selected(variable: "Variable", dim: str, mask: list[bool]) -> "Variable":
 
     axis = variable.dims.index(dim)
     return variable.with_arrays(partial(np.compress, mask, axis=axis))
-
-
-def by_symmetry(name: str, zero: Iterable[str]) -> str:
-    """Return why a variable is zero, of those that a symmetry makes zero; "" for
-    another."""
-    return "by symmetry" if name in zero else ""
-
-
-def with_units(variable: "Variable", lengths: str, angles: str) -> "Variable":
-    """Return a variable over components with a unit for each: of x and y, and theta."""
-    return replace(variable, unit=(lengths, lengths, angles))
 
 
 def warn_of_notes(result: "Result") -> None:
