@@ -1,2 +1,2 @@
-"""Terradynamics: forces of grains on plates, meshes and robots in the vertical plane and in
-space."""
+"""Terradynamics: forces of grains on plates, meshes and walking robots, in the vertical
+plane and in three dimensions."""

@@ -1,13 +1,15 @@
-"""The base of prescribed motions, of outlines in the vertical plane and of meshes."""
+"""The base of prescribed motions, for outlines in the vertical plane and for meshes."""
 
 from __future__ import annotations
 
 import math
 from typing import Annotated
 
-from rft.core.checks import Number
+import numpy as np
+
+from rft.core.checks import Number, real_array
 from rft.core.metres import LARGEST, metres
-from rft.core.refusal import require
+from rft.core.refusal import Refusal, require
 
 MOST_SAMPLES = 100_000
 FARTHEST = 1e3  # m along the ground
@@ -27,26 +29,59 @@ Height = Annotated[
 
 
 class Motion:
-    """Base of motions. turns: whether the progress of the motion is the angle of the body, not its position."""
+    """Base of motions.
+
+    samples: number of poses. turns: True where the body's angle measures the progress
+    of the motion, False where its position does.
+    """
 
     samples: int
     turns = False
 
     def require_downwards(self) -> None:
         """Raise ValueError unless the direction points into the ground."""
-        message = "direction must point downwards, between 0 and 180 degrees below the horizontal"
-        require(0.01 < self.direction < math.pi - 0.01, message)
+        require(
+            0.01 < self.direction < math.pi - 0.01,
+            "direction must point downwards, "
+            "between 0 and 180 degrees below the horizontal",
+        )
 
     def require_turning(self) -> None:
         """Raise ValueError unless the rate leads from start to stop."""
         require(
-            abs(self.rate) >= 1e-09,
+            abs(self.rate) >= 1e-9,
             "rate must not be 0",
             because="drag a body that does not turn",
         )
-        forwards = (self.stop - self.start) * self.rate > 0
+        reaches_stop = (self.stop - self.start) * self.rate > 0
         require(
-            forwards,
+            reaches_stop,
             "a rate from start to stop",
             because="positive if stop > start, else negative",
         )
+
+
+def set_numbers(path: Motion, name: str, largest: float, unit: str = "") -> None:
+    """Store a field of a path as a tuple of numbers; ValueError unless it is a list of
+    finite numbers, of at most ``largest`` in size."""
+    values = real_array(name, getattr(path, name))
+    require(values.ndim == 1, f"{name} must be a list of numbers")
+    object.__setattr__(path, name, tuple(values.tolist()))
+    is_within = bool((np.abs(values) <= largest).all())
+    require(is_within, f"{name} must be finite and within {largest:g}{unit}")
+
+
+def require_path_length(t: tuple[float, ...]) -> None:
+    """Raise ValueError unless a path has as many poses as it may have."""
+    require(
+        3 <= len(t) <= MOST_SAMPLES,
+        f"a path takes 3 to {MOST_SAMPLES} poses",
+        value=len(t),
+    )
+
+
+def require_ascending(t: tuple[float, ...]) -> None:
+    """Raise ValueError unless each time of a path is before the next."""
+    late = np.flatnonzero(np.diff(t) <= 0)
+    if late.size:
+        raise Refusal(f"t must ascend, but t = {t[late[0]]:g} is not before the next")

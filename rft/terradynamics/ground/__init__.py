@@ -1,4 +1,5 @@
-"""The ground under plates and triangles: its strength and rounding, the lead of faces, and effects, one file each."""
+"""The ground under plates and triangles: its strength and rounding, the lead of faces,
+and effects on the ground, one file each."""
 
 from rft.core.registry import load_all
 from rft.terradynamics.ground.aeration import Aeration
@@ -19,9 +20,19 @@ from rft.terradynamics.ground.slope import Slope
 load_all(__name__, __path__)
 
 __all__ = [
-    "GROUND_EFFECTS", "Aeration", "DisturbedGround", "GrainInertia", "Ground", "GroundEffect", "Slope", "checked_effects",
-    "ground_of", "inverse_speed", "strength_at", "weight",
-]  # fmt: skip
+    "GROUND_EFFECTS",
+    "Aeration",
+    "DisturbedGround",
+    "GrainInertia",
+    "Ground",
+    "GroundEffect",
+    "Slope",
+    "checked_effects",
+    "ground_of",
+    "inverse_speed",
+    "strength_at",
+    "weight",
+]
 
 
 def __dir__() -> list[str]:

@@ -1,4 +1,5 @@
-"""Air that rises through the grains weakens them; where it fluidises them they bear nothing."""
+"""Air that rises through the grains weakens the ground, down to nothing where it
+fluidises them."""
 
 from __future__ import annotations
 
@@ -13,11 +14,12 @@ from rft.terradynamics.ground.base import GROUND_EFFECTS, Ground, GroundEffect
 @GROUND_EFFECTS.register
 @dataclass(frozen=True)
 class Aeration(GroundEffect):
-    """The strength is 1 - air_speed / fluidisation times that of still ground; the stress map keeps its shape.
+    """Air through the ground, which multiplies its strength by
+    1 - air_speed / fluidisation; the stress map keeps its shape.
 
-    An air speed of fluidisation, or more, is refused: no resistive force theory is known there. Strength falls
-    linearly with air speed by measurements of alpha_z(0, 90 degrees). The same fall at all angles, down to nothing, is
-    assumed.
+    An air speed at or above ``fluidisation`` is refused: no resistive force theory is
+    known there. Measured alpha_z(0, 90 degrees) falls linearly with the air speed. The
+    same fall at all angles, down to nothing, is assumed.
 
     Examples
     --------
@@ -43,17 +45,16 @@ class Aeration(GroundEffect):
 
     def __post_init__(self):
         check_numbers(self)
-        message = f"air_speed = {self.air_speed:g} m/s: the ground is fluidised from {self.fluidisation:g} m/s on"
         require(
             self.air_speed < self.fluidisation,
-            f"{message}, and no longer bears as this law says",
+            f"air_speed = {self.air_speed:g} m/s: the ground is fluidised from "
+            f"{self.fluidisation:g} m/s on, and no longer bears as this law says",
             instead="give less",
         )
 
     def apply(self, ground: Ground) -> Ground:
-        return ground._replace(
-            strength=ground.strength * (1.0 - self.air_speed / self.fluidisation)
-        )
+        share = 1.0 - self.air_speed / self.fluidisation
+        return ground._replace(strength=ground.strength * share)
 
     @property
     def assumes(self) -> str:

@@ -1,11 +1,14 @@
-"""The ground: how strong it is at a place, and how effects that a scene names change it.
+"""The strength of the ground at a place, and the effects that change it.
 
-On a face at x with the unit normal n and the unit velocity v, whose speed across itself is v_n m/s, the stress is
+On a face at x with the unit normal n, the unit velocity v and the speed v_n, m/s, along
+its normal, the stress is
 
     strength(x, v) x |z| x alpha(n, v) x lead  -  flux v_n^2 n.
 
-Here alpha is the law's stress per unit depth, and lead is a function of `rft.terradynamics.ground.lead`. An effect changes the
-`Ground`, which holds strength and flux. Effects commute, and they are the same on plates and on triangles."""
+Here alpha is the law's stress per unit depth, and lead is a function of
+`rft.terradynamics.ground.lead`. A scene names effects; each changes the `Ground`, which
+holds strength and flux. Effects commute, and they are the same on plates and on
+triangles."""
 
 from __future__ import annotations
 
@@ -26,11 +29,13 @@ UNDISTURBED = np.zeros((0, 3))
 class Ground(NamedTuple):
     """State of the ground, in numbers, or in arrays where samples differ.
 
-    strength: factor of the law's stress. flux: lambda rho of the grains' inertia, kg/m^3. rounding: m/s; a face of
-    speed v bears v / sqrt(v^2 + rounding^2) times the stress of the law, which jumps at rest. grazing_sine: sine of the
-    grazing angle, over which a face begins to lead; 0 for a jump. downhill_loss: share of the strength that motion
-    along +x loses, or along -x where it is negative. disturbed: (G, 2 + P), one row for each effect: radius, m, weakening, and
-    places x, m; places at infinity fill short rows up.
+    strength: factor of the law's stress. flux: lambda rho of the grains' inertia,
+    kg/m^3. rounding: m/s; a face of speed v bears v / sqrt(v^2 + rounding^2) times the
+    law's stress, which jumps at rest. grazing_sine: sine of the grazing angle, over
+    which a face begins to lead; 0 for a jump. downhill_loss: share of the strength lost
+    in motion along +x, or along -x where it is negative. disturbed: (G, 2 + P), one row
+    for each effect `DisturbedGround`: radius, m, weakening, and places x, m; places at
+    infinity fill up short rows.
 
     Examples
     --------
@@ -49,13 +54,16 @@ class Ground(NamedTuple):
 
 @formula
 def strength_at(ground, x, v_x):
-    """Return the strength at places x along the ground, m, for unit velocities with the component ``v_x`` along x.
+    """Return the strength of the ground at places x along it, m, for unit velocities
+    with the component ``v_x`` along x.
 
     Examples
     --------
     >>> import numpy as np
     >>> from rft.terradynamics.ground import Slope, ground_of, strength_at
-    >>> strength_at(ground_of([Slope(angle=0.2)]), np.zeros(2), np.array([1.0, -1.0])).round(3)  # up and down the slope
+    >>> slope = ground_of([Slope(angle=0.2)])
+    >>> uphill_and_downhill = np.array([1.0, -1.0])
+    >>> strength_at(slope, np.zeros(2), uphill_and_downhill).round(3)
     array([0.98 , 0.725])
     """
     strength = ground.strength * (1.0 - maximum(ground.downhill_loss * v_x, 0.0))
@@ -70,8 +78,9 @@ def strength_at(ground, x, v_x):
 
 @formula
 def inverse_speed(ground, speed):
-    """Return 1 / sqrt(speed^2 + rounding^2), s/m, and 0 at rest; speed times this is the share of stress that a face
-    bears.
+    """Return 1 / sqrt(speed^2 + rounding^2), s/m, and 0 at rest.
+
+    The speed times this value is the share of the law's stress that a face bears.
 
     Examples
     --------
@@ -86,11 +95,12 @@ def inverse_speed(ground, speed):
 
 @dataclass(frozen=True)
 class GroundEffect:
-    """Base of effects on the ground; each effect is a frozen dataclass. As the parameter named in ``limit`` goes to its
-    limit, forces approach those of the plain law at ``order``.
+    """Base of effects on the ground; each effect is a frozen dataclass.
 
-    kind: name of the effect in scenes and messages. breaks: premises of the plain law that the effect breaks. walks:
-    whether robots can walk on such ground.
+    kind: name of the effect in scenes and messages. breaks: premises of the plain law
+    that the effect breaks. limit, order: as the parameter named in ``limit`` goes to
+    its limit, forces approach those of the plain law at this order. cost: what the
+    effect adds to a computation. walks: whether robots can walk on such ground.
 
     Examples
     --------
@@ -108,7 +118,8 @@ class GroundEffect:
 
     @classmethod
     def examples(cls, x: float = 0.3) -> dict[str, Self]:
-        """Return effects by name, the one of ``order`` by ``kind`` alone, that vanish as x goes to 0."""
+        """Return effects by name that vanish as x goes to 0; the one named ``kind``
+        does so at ``order``."""
         return {cls.kind: cls()}
 
     def apply(self, ground: Ground) -> Ground:
@@ -116,7 +127,8 @@ class GroundEffect:
         raise NotImplementedError
 
     def weight(self) -> tuple[float, float]:
-        """Return the force (x, z), N, that the effect adds at the body's origin besides the grains' force."""
+        """Return the force (x, z), N, that the effect adds at the body's origin to the
+        force of the grains."""
         return 0.0, 0.0
 
     @property
@@ -134,7 +146,8 @@ GROUND_EFFECTS = Registry(
 
 
 def ground_of(effects: Sequence[GroundEffect], ground: Ground | None = None) -> Ground:
-    """Return the ground with all effects; ValueError for anything but a list of effects.
+    """Return the ground, or the default one, with all effects applied; ValueError for
+    anything but a list of effects.
 
     Examples
     --------
@@ -150,7 +163,8 @@ def ground_of(effects: Sequence[GroundEffect], ground: Ground | None = None) -> 
 
 
 def weight(effects: Sequence[GroundEffect]) -> np.ndarray:
-    """Return the sum (2,) of the forces (x, z), N, that effects add at the body's origin besides the grains' force.
+    """Return the sum (2,) of the forces (x, z), N, that effects add at the body's
+    origin to the force of the grains.
 
     Examples
     --------
@@ -158,12 +172,13 @@ def weight(effects: Sequence[GroundEffect]) -> np.ndarray:
     >>> weight([Slope(angle=0.2, mass=1.0)]).round(3)  # N
     array([-1.949,  0.   ])
     """
-    return np.sum([effect.weight() for effect in effects] or [(0.0, 0.0)], axis=0)
+    forces = [effect.weight() for effect in effects]
+    return np.sum(forces or [(0.0, 0.0)], axis=0)
 
 
 def checked_effects(effects) -> tuple[GroundEffect, ...]:
-    """Return the effects as a tuple; ValueError for anything else in the list, and for a kind that stands twice, but for
-    disturbed ground.
+    """Return the effects as a tuple; ValueError for anything but a list of effects, and
+    for two effects of one kind, except disturbed ground.
 
     Examples
     --------
@@ -171,18 +186,14 @@ def checked_effects(effects) -> tuple[GroundEffect, ...]:
     >>> checked_effects([Aeration(0.1, 0.25)])[0].kind
     'aeration'
     """
-    valid = isinstance(effects, Sequence) and all(
-        isinstance(e, GroundEffect) for e in effects
-    )
+    is_list = isinstance(effects, Sequence)
     require(
-        valid,
+        is_list and all(isinstance(effect, GroundEffect) for effect in effects),
         "effects must be a list of effects such as Aeration(0.01, 0.03)",
         value=effects,
     )
-    kinds = [e.kind for e in effects]
-    duplicates = sorted(
-        {k for k in kinds if kinds.count(k) > 1 and k != "disturbed-ground"}
-    )
+    kinds = [effect.kind for effect in effects if effect.kind != "disturbed-ground"]
+    duplicates = sorted({kind for kind in kinds if kinds.count(kind) > 1})
     require(
         not duplicates,
         f"{', '.join(duplicates)} stands twice in effects",

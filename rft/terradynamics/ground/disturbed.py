@@ -18,13 +18,17 @@ MOST_PLACES = 1000
 @GROUND_EFFECTS.register
 @dataclass(frozen=True)
 class DisturbedGround(GroundEffect):
-    """The strength is 1 - weakening x disturbance times that of fresh ground, at all depths. Disturbance is 1 up to half
-    a ``radius`` along the ground from any of the ``places``, and falls linearly to 0 at one and a half.
+    """Ground near earlier intrusions, whose strength at all depths is
+    1 - weakening x disturbance times that of fresh ground.
+
+    The disturbance is 1 up to half a ``radius`` along the ground from any of the
+    ``places``, and falls linearly to 0 at one and a half.
 
     places (m): x of earlier intrusions.
 
-    Disturbed grains bear less by experiment (paper Sec. IV B). The form and every number are assumed; so is that
-    disturbances neither add up nor heal. The motion itself disturbs nothing: places are given.
+    Experiments show that disturbed grains bear less (paper Sec. IV B). The form of the
+    disturbance and its numbers are assumed, as is that disturbances neither add up nor
+    heal. The motion itself disturbs nothing; only the given places count.
 
     Examples
     --------
@@ -56,13 +60,9 @@ class DisturbedGround(GroundEffect):
 
     def __post_init__(self):
         places = real_array("places", self.places)
-        valid = (
-            places.ndim == 1
-            and 1 <= places.size <= MOST_PLACES
-            and bool((np.abs(places) <= 1e3).all())
-        )
+        is_list = places.ndim == 1 and 1 <= places.size <= MOST_PLACES
         require(
-            valid,
+            is_list and bool((np.abs(places) <= 1e3).all()),
             f"places must be 1 to {MOST_PLACES} numbers in m, within 1000",
             value=self.places,
         )
@@ -70,11 +70,10 @@ class DisturbedGround(GroundEffect):
         check_numbers(self)
 
     def apply(self, ground: Ground) -> Ground:
-        rows = [
-            *ground.disturbed,
-            np.array([self.radius, self.weakening, *self.places]),
-        ]
+        row = np.array([self.radius, self.weakening, *self.places])
+        rows = [*ground.disturbed, row]
         size = max(map(len, rows))
+        # Places at infinity, which disturb nothing, fill up the shorter rows.
         padded = [np.append(row, np.full(size - len(row), np.inf)) for row in rows]
         return ground._replace(disturbed=np.array(padded))
 

@@ -1,4 +1,5 @@
-"""Inertia of the grains that a fast body pushes away: a pressure on leading faces that grows as their speed squared."""
+"""Inertia of the grains that a fast body pushes away: a pressure on leading faces that
+grows with the square of their speed."""
 
 from __future__ import annotations
 
@@ -15,10 +16,12 @@ POPPY_SEEDS = 638.0  # kg/m^3, loosely packed; Agarwal et al. (2021)
 @GROUND_EFFECTS.register
 @dataclass(frozen=True)
 class GrainInertia(GroundEffect):
-    """A stress of strength x density x v_n^2 against the normal of leading faces, at any depth, where v_n is the speed of
-    a face along its normal: the momentum of grains that are swept up (Agarwal et al. 2021; paper Sec. IV C).
+    """A stress of strength x density x v_n^2 against the normal of leading faces, at
+    any depth, where v_n is the speed of a face along its normal.
 
-    The paper's other finding, a surface that sinks behind a fast body, is not modelled.
+    It is the momentum that the face gives to the grains it sweeps up (Agarwal et al.
+    2021; paper Sec. IV C). The other finding of that work, a surface that sinks behind
+    a fast body, is not modelled.
 
     Examples
     --------
@@ -42,7 +45,7 @@ class GrainInertia(GroundEffect):
 
     kind = "grain-inertia"
     breaks = Premise.RATE_INDEPENDENT
-    limit = "strength = 0"  # of the rate of the motion = 0 the order is 2
+    limit = "strength = 0"  # in the rate of the motion the order is 2
     cost = "five operations an element"
     walks = True
 
@@ -54,17 +57,12 @@ class GrainInertia(GroundEffect):
 
     @property
     def assumes(self) -> str:
-        defaults = {
-            "strength": self.strength == 1.0,
-            "density": self.density == POPPY_SEEDS,
-        }
-        descriptions = {
-            "strength": "lambda = 1 (1 to 4 are known)",
-            "density": f"{POPPY_SEEDS:g} kg/m^3, of loose poppy seeds",
-        }
-        return ", ".join(
-            descriptions[name] for name, is_default in defaults.items() if is_default
-        )
+        assumptions = []
+        if self.strength == 1.0:
+            assumptions.append("lambda = 1 (1 to 4 are known)")
+        if self.density == POPPY_SEEDS:
+            assumptions.append(f"{POPPY_SEEDS:g} kg/m^3, of loose poppy seeds")
+        return ", ".join(assumptions)
 
     @classmethod
     def examples(cls, x: float = 0.3) -> dict[str, GrainInertia]:

@@ -1,8 +1,10 @@
-"""The lead of a face: the share of its stress that it bears, from 1 where it leads to 0 where it trails.
+"""The lead of a face: the share of the law's stress that it bears, 1 where the face
+leads and 0 where it trails.
 
-The law of stress jumps where a face begins to lead. ``n_dot_v`` is n . v, with n the outward unit normal of the face and
-v its unit velocity. ``grazing_sine`` is the sine of the grazing angle, over which the lead rises from 0 to 1. All
-functions are formulas (`rft.formulas.vectors`)."""
+The law of stress jumps where a face begins to lead. ``n_dot_v`` is n . v, with n the
+outward unit normal of the face and v its unit velocity. ``grazing_sine`` is the sine of
+the grazing angle, over which the lead rises from 0 to 1. All functions are formulas
+(`rft.formulas.vectors`)."""
 
 from __future__ import annotations
 
@@ -18,7 +20,7 @@ def jump(n_dot_v):
 
 @formula
 def smoothstep(n_dot_v, grazing_sine):
-    """Return s^2 (3 - 2 s) with s = n_dot_v / grazing_sine, held between 0 and 1."""
+    """Return s^2 (3 - 2 s) with s = n_dot_v / grazing_sine, clipped to 0 to 1."""
     share = minimum(maximum(n_dot_v / grazing_sine, 0.0), 1.0)
     return share * share * (3.0 - 2.0 * share)
 
@@ -33,9 +35,8 @@ def smoothstep_slope(n_dot_v, grazing_sine):
 @formula
 def rounded(n_dot_v, grazing_sine):
     """Return n_dot_v / sqrt(n_dot_v^2 + grazing_sine^2), and 0 where a face trails."""
-    return maximum(n_dot_v, 0.0) / maximum(
-        sqrt(n_dot_v * n_dot_v + grazing_sine * grazing_sine), TINY
-    )
+    size = maximum(sqrt(n_dot_v * n_dot_v + grazing_sine * grazing_sine), TINY)
+    return maximum(n_dot_v, 0.0) / size
 
 
 @formula
@@ -48,18 +49,17 @@ def rounded_slope(n_dot_v, grazing_sine):
 
 @formula
 def mean_ramp(first, last, grazing_sine):
-    """Return the mean of min(n_dot_v / grazing_sine, 1) over a part of a face along which n_dot_v changes linearly from
-    ``first`` to ``last``, both at least 0."""
+    """Return the mean of min(n_dot_v / grazing_sine, 1) over a part of a face along
+    which n_dot_v changes linearly from ``first`` to ``last``, both at least 0."""
     scale = 1.0 / grazing_sine
-    a, b = maximum(first * scale, 0.0), maximum(last * scale, 0.0)
-    below_a, below_b = (
-        where(a < 1.0, 0.5 * a * a, a - 0.5),
-        where(b < 1.0, 0.5 * b * b, b - 0.5),
-    )
+    a = maximum(first * scale, 0.0)
+    b = maximum(last * scale, 0.0)
+
+    # The integral of min(s, 1) from 0 to a, and to b.
+    up_to_a = where(a < 1.0, 0.5 * a * a, a - 0.5)
+    up_to_b = where(b < 1.0, 0.5 * b * b, b - 0.5)
+
     step = b - a
-    constant = absolute(step) < 1e-6
-    return where(
-        constant,
-        minimum(0.5 * (a + b), 1.0),
-        (below_b - below_a) / where(constant, 1.0, step),
-    )
+    is_constant = absolute(step) < 1e-6
+    mean = (up_to_b - up_to_a) / where(is_constant, 1.0, step)
+    return where(is_constant, minimum(0.5 * (a + b), 1.0), mean)

@@ -1,4 +1,5 @@
-"""A surface that slopes: gravity pulls the body along it, and the ground is weaker for faces that move downhill."""
+"""A sloping surface: gravity pulls the body along it, and the ground is weaker under
+faces that move downhill."""
 
 from __future__ import annotations
 
@@ -16,19 +17,25 @@ from rft.terradynamics.ground.base import GROUND_EFFECTS, Ground, GroundEffect
 @GROUND_EFFECTS.register
 @dataclass(frozen=True)
 class Slope(GroundEffect):
-    """The surface rises towards +x; x runs along it, z away from it, depth along z.
+    """A surface that rises towards +x; x is along it, z and depths are normal to it.
 
-    The default repose, 37.9 degrees, gives a plate that moves straight downhill at 20 degrees half its drag on level
-    ground, as measured (paper Sec. IV B); 30 degrees, as of many heaps, would give a third. Gravity adds the force
-    -mass g sin(angle) along the slope at the body's origin; the power is that of the grains alone.
+    With the default angle of repose, 37.9 degrees, a plate that moves straight downhill
+    on a slope of 20 degrees has half its drag on level ground, as measured (paper Sec.
+    IV B). With 30 degrees, the angle of many heaps, it would have a third. Gravity adds
+    the force -mass g sin(angle) along the slope at the body's origin. Powers are those
+    of the grains alone.
 
-    The strength is cos(angle) - d sin|angle| / tan(repose) times that of level ground. Here d, 0 to 1, is the downhill
-    component of the face's unit velocity, 0 for a face that moves straight in, across or uphill. Straight downhill the
-    factor is sin(repose - |angle|) / sin(repose): grains |z| deep can take a shear of rho g |z| cos(angle) tan(repose),
-    of which their own weight along the slope takes rho g |z| sin|angle|. One direction at one angle has been measured.
-    Assumed are a strength that falls in proportion to d, no gain uphill, and one factor for forces along and across a
-    face. Liao and Qian (arXiv:2603.06928, 2026) find the resistance to penetration nearly unchanged by a slope and that
-    to shear much less.
+    The strength is cos(angle) - d sin|angle| / tan(repose) times that of level ground.
+    Here d, 0 to 1, is the downhill component of the face's unit velocity, 0 for a face
+    that moves straight in, across or uphill. Straight downhill the factor is
+    sin(repose - |angle|) / sin(repose): grains |z| deep can take a shear of
+    rho g |z| cos(angle) tan(repose), of which their own weight along the slope takes
+    rho g |z| sin|angle|.
+
+    One direction at one angle has been measured. Assumed are a strength that falls in
+    proportion to d, no gain uphill, and one factor for forces along and across a face.
+    Liao and Qian (arXiv:2603.06928, 2026) find that a slope hardly changes the
+    resistance to penetration and much reduces the resistance to shear.
 
     Examples
     --------
@@ -65,9 +72,13 @@ class Slope(GroundEffect):
 
     def __post_init__(self):
         check_numbers(self)
-        angle, repose = math.degrees(self.angle), math.degrees(self.repose)
-        message = f"a slope of {angle:.3g} degrees slides by itself: it must be below the angle of repose, {repose:.3g} degrees"
-        require(abs(self.angle) < self.repose, message)
+        angle = math.degrees(self.angle)
+        repose = math.degrees(self.repose)
+        require(
+            abs(self.angle) < self.repose,
+            f"a slope of {angle:.3g} degrees slides by itself: "
+            f"it must be below the angle of repose, {repose:.3g} degrees",
+        )
 
     def apply(self, ground: Ground) -> Ground:
         loss = -math.tan(self.angle) / math.tan(self.repose)
@@ -80,8 +91,14 @@ class Slope(GroundEffect):
 
     @property
     def assumes(self) -> str:
-        default = f"an angle of repose of {math.degrees(REPOSE):.1f} degrees, from half the drag downhill at 20, and "
-        return f"{default if self.repose == REPOSE else ''}that only what moves downhill meets weaker ground"
+        downhill_only = "that only what moves downhill meets weaker ground"
+        if self.repose != REPOSE:
+            return downhill_only
+        repose = math.degrees(REPOSE)
+        return (
+            f"an angle of repose of {repose:.1f} degrees, "
+            f"from half the drag downhill at 20, and {downhill_only}"
+        )
 
     @classmethod
     def examples(cls, x: float = 0.3) -> dict[str, Slope]:
