@@ -1,4 +1,5 @@
-"""The vertical plane (terradynamics): stress maps, outlines, motions, and the force of the grains on moving outlines."""
+"""The vertical plane (terradynamics): stress maps, outlines, motions, and the force of
+the grains on moving outlines."""
 
 from rft.terradynamics.plates.catalogue import VERTICAL, VerticalEntry
 from rft.terradynamics.plates.contact import Part

@@ -25,7 +25,8 @@ class VerticalEntry:
 
 
 def _scaled(zeta: float, grains: str) -> VerticalEntry:
-    """Return the generic set times zeta, fitted to some grains."""
+    """Return the entry of the generic set times zeta, which was fitted to
+    ``grains``."""
     return VerticalEntry(
         StressMap(zeta=zeta),
         f"generic set M0 times zeta = {zeta:g}, fitted to {grains}; {LI}",
@@ -35,7 +36,7 @@ def _scaled(zeta: float, grains: str) -> VerticalEntry:
 LOOSE = StressMap(0.051, 0.047, 0.053, 0.083, 0.020, -0.026, 0.057, 0.0, 0.025)
 CLOSE = StressMap(0.094, 0.092, 0.092, 0.151, 0.035, -0.039, 0.086, 0.018, 0.046)
 
-# In three dimensions the strength xi_n is matched to what a level plate bears.
+# In three dimensions xi_n is chosen so that a level plate bears the same.
 OWN = f"its own nine coefficients; {LI}; a level plate bears"
 
 VERTICAL = {

@@ -1,5 +1,5 @@
-"""Prescribed motions in the vertical plane, one class a kind: poses and twists in time. SI units; signs as in
-`rft.terradynamics.plates.loads`."""
+"""Prescribed motions in the vertical plane, one class per kind: poses and twists in
+time. SI units; signs as in `rft.terradynamics.plates.loads`."""
 
 from __future__ import annotations
 
@@ -9,19 +9,21 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from rft.core.checks import Number, check_numbers, real_array
+from rft.core.checks import Number, check_numbers
 from rft.core.metres import LARGEST, metres
 from rft.core.refusal import require
 from rft.terradynamics.plates.outline import Outline
 from rft.terradynamics.prescribed import (
     FARTHEST,
-    MOST_SAMPLES,
     Depth,
     Direction,
     Distance,
     Height,
     Motion,
     Samples,
+    require_ascending,
+    require_path_length,
+    set_numbers,
 )
 
 Speed = Annotated[float, Number(1e-9, 1e3, "m/s", "speed; it changes no force")]
@@ -35,12 +37,14 @@ Angle = Annotated[
 
 
 class Trajectory(NamedTuple):
-    """A motion in time. t: (T,), s. pose: (T, 3) as (x, z, angle), m and rad. twist: (T, 3) as (v_x, v_z, rate).
+    """A motion in time. t: (T,), s. pose: (T, 3) as (x, z, angle), m and rad. twist:
+    (T, 3) as (v_x, v_z, rate).
 
     Examples
     --------
     >>> from rft.terradynamics.plates import CLeg, Rotate
-    >>> motion = Rotate(hub_height=0.02, samples=5).trajectory(CLeg(0.038, 0.02).outline(24))
+    >>> leg = CLeg(0.038, 0.02).outline(24)
+    >>> motion = Rotate(hub_height=0.02, samples=5).trajectory(leg)
     >>> motion.pose[:, 2].round(3)  # angle, rad
     array([-3.142, -1.571,  0.   ,  1.571,  3.142])
     """
@@ -52,12 +56,13 @@ class Trajectory(NamedTuple):
 
 @dataclass(frozen=True)
 class Drag(Motion):
-    """Motion along a straight line without turning.
+    """Motion along a straight line without rotation.
 
     Examples
     --------
     >>> from rft.terradynamics.plates import Drag, RoundRod
-    >>> motion = Drag(depth=0.05, distance=0.1).trajectory(RoundRod(0.01, 0.1).outline(40))
+    >>> rod = RoundRod(0.01, 0.1).outline(40)
+    >>> motion = Drag(depth=0.05, distance=0.1).trajectory(rod)
     >>> motion.pose[[0, -1]].round(3)
     array([[ 0.  , -0.05,  0.  ],
            [ 0.1 , -0.05,  0.  ]])
@@ -80,7 +85,8 @@ class Drag(Motion):
 
 @dataclass(frozen=True)
 class Penetrate(Motion):
-    """Motion straight down, or on a slope, from where the outline's lowest point touches the surface.
+    """Motion straight or obliquely down, from where the outline's lowest point touches
+    the surface.
 
     Examples
     --------
@@ -146,16 +152,17 @@ class Rotate(Motion):
         angle = np.linspace(self.start, self.stop, self.samples)
         t = (angle - self.start) / self.rate
         pose = np.stack([self.speed * t, np.full_like(t, self.hub_height), angle], -1)
-        return Trajectory(
-            t, pose, np.broadcast_to([self.speed, 0.0, self.rate], pose.shape)
-        )
+        twist = np.broadcast_to([self.speed, 0.0, self.rate], pose.shape)
+        return Trajectory(t, pose, twist)
 
 
 @dataclass(frozen=True)
 class Path(Motion):
-    """Motion through given poses. Velocities are differences of order 2 in the spacing of t.
+    """Motion through given poses. Velocities are differences of order 2 in the spacing
+    of t.
 
-    t (s): times, ascending. x, z (m): of the frame's origin. angle (rad): of the body, 0 throughout if left out.
+    t (s): times, ascending. x, z (m): of the frame's origin. angle (rad): of the body,
+    0 throughout if left out.
 
     Examples
     --------
@@ -171,30 +178,17 @@ class Path(Motion):
     angle: tuple[float, ...] = ()
 
     def __post_init__(self):
-        for name in ("t", "x", "z", "angle"):
-            values = real_array(name, getattr(self, name))
-            require(values.ndim == 1, f"{name} must be a list of numbers")
-            object.__setattr__(self, name, tuple(map(float, values)))
-            largest, unit = {"x": (FARTHEST, " m"), "z": (LARGEST, " m")}.get(
-                name, (1e9, "")
-            )
-            within = all(abs(v) <= largest for v in getattr(self, name))
-            require(within, f"{name} must be finite and within {largest:g}{unit}")
+        set_numbers(self, "t", 1e9)
+        set_numbers(self, "x", FARTHEST, " m")
+        set_numbers(self, "z", LARGEST, " m")
+        set_numbers(self, "angle", 1e9)
+        require_path_length(self.t)
         require(
-            3 <= len(self.t) <= MOST_SAMPLES,
-            f"a path takes 3 to {MOST_SAMPLES} poses",
-            value=len(self.t),
+            len(self.x) == len(self.z) == len(self.t)
+            and len(self.angle) in (0, len(self.t)),
+            "t, x, z and angle must be equally many",
         )
-        same = len(self.x) == len(self.z) == len(self.t) and len(self.angle) in (
-            0,
-            len(self.t),
-        )
-        require(same, "t, x, z and angle must be equally many")
-        late = np.flatnonzero(np.diff(self.t) <= 0)
-        require(
-            not late.size,
-            f"t must ascend, but t = {(self.t[late[0]] if late.size else 0):g} is not before the next",
-        )
+        require_ascending(self.t)
 
     @property
     def samples(self) -> int:
@@ -202,20 +196,21 @@ class Path(Motion):
 
     def trajectory(self, outline: Outline) -> Trajectory:
         """Return the motion of an outline in time."""
-        t, angle = np.array(self.t), self.angle or (0.0,) * len(self.t)
+        t = np.array(self.t)
+        angle = self.angle or np.zeros_like(t)
         pose = np.stack([self.x, self.z, angle], -1)
-        return Trajectory(t, pose, np.gradient(pose, t, axis=0, edge_order=2))
+        twist = np.gradient(pose, t, axis=0, edge_order=2)
+        return Trajectory(t, pose, twist)
 
 
 MOTIONS = {"drag": Drag, "penetrate": Penetrate, "rotate": Rotate, "csv": Path}
 
 
 def _straight(motion, x: float, z: float, distance: float) -> Trajectory:
-    """Return a motion along a straight line of a length, m, from (x, z)."""
+    """Return a motion over a distance, m, along a straight line from (x, z)."""
     along = np.array([math.cos(motion.direction), -math.sin(motion.direction), 0.0])
     along[np.abs(along) < 1e-15] = 0.0  # straight down, or level, to the last digit
     s = np.linspace(0.0, distance, motion.samples)
     pose = np.array([x, z, motion.attitude]) + s[:, None] * along
-    return Trajectory(
-        s / motion.speed, pose, np.broadcast_to(motion.speed * along, pose.shape)
-    )
+    twist = np.broadcast_to(motion.speed * along, pose.shape)
+    return Trajectory(s / motion.speed, pose, twist)

@@ -1,4 +1,5 @@
-"""The outline of a body that does not change along its width: straight elements between points in the vertical plane."""
+"""The outline of a body whose section is the same along its width: straight elements
+between points in the vertical plane."""
 
 from __future__ import annotations
 
@@ -12,17 +13,21 @@ from rft.core.metres import LARGEST, metres
 from rft.core.refusal import require
 
 MOST_ELEMENTS = 5000
-FEW_ELEMENTS = 500  # elements up to which all pairs are compared at once, without loading SciPy's tree
+# Up to this number all pairs of elements are compared, without loading SciPy's tree.
+MOST_COMPARED = 500
 
 
 @dataclass(frozen=True, eq=False)
 class Outline:
     """A chain of straight elements in the body's frame, m.
 
-    points: (N + 1, 2) as (x, z), the last repeating the first if the outline is closed. smooth_normals: (N, 2, 2), unit
-    normals at both ends of each element of a chain that stands for a curve; None for the normals of the elements. A
-    closed outline has faces outwards, and is stored counter-clockwise with x to the right and z up. An open one is a thin
-    sheet; either side may lead. Refused: outlines that cross or touch themselves, elements of no length.
+    points: (N + 1, 2) as (x, z), the last equal to the first if the outline is closed.
+    smooth_normals: (N, 2, 2), unit normals at both ends of each element of a chain that
+    stands for a curve; None for the normals of the elements.
+
+    A closed outline faces outwards, and is stored counter-clockwise with x to the right
+    and z up. An open one is a thin sheet, of which either side may lead. Refused:
+    outlines that cross or touch themselves, and elements without length.
 
     Examples
     --------
@@ -51,24 +56,12 @@ class Outline:
             bool((np.abs(points) <= LARGEST).all()),
             f"points must be finite and within {LARGEST:g} m",
         )
-        normals = (
-            None
-            if self.smooth_normals is None
-            else real_array("smooth_normals", self.smooth_normals)
-        )
-        valid = normals is None or (
-            normals.shape == (len(points) - 1, 2, 2)
-            and bool(np.isfinite(normals).all())
-        )
-        require(
-            valid,
-            f"smooth_normals must be unit normals of shape ({len(points) - 1}, 2, 2)",
-        )
+        normals = self.smooth_normals
+        if normals is not None:
+            normals = _checked_normals(normals, len(points) - 1)
         if self.closed and _area(points) < 0.0:
-            points, normals = (
-                points[::-1],
-                None if normals is None else normals[::-1, ::-1],
-            )
+            points = points[::-1]
+            normals = None if normals is None else normals[::-1, ::-1]
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "smooth_normals", normals)
         _check_simple(points, self.closed)
@@ -76,9 +69,9 @@ class Outline:
     @property
     def closed(self) -> bool:
         """True if the last point is the first."""
-        return len(self.points) > 3 and bool(
-            (np.asarray(self.points[0]) == np.asarray(self.points[-1])).all()
-        )
+        first = np.asarray(self.points[0])
+        last = np.asarray(self.points[-1])
+        return len(self.points) > 3 and bool((first == last).all())
 
     @property
     def elements(self) -> int:
@@ -97,22 +90,33 @@ class Outline:
 
     @property
     def normals(self) -> np.ndarray:
-        """Unit normals (N, 2) of the elements, to the right of the direction from point to point: outwards if closed."""
+        """Unit normals (N, 2) of the elements, to the right of the direction from point
+        to point: outwards if closed."""
         along = np.diff(self.points, axis=0) / self.lengths[:, None]
         return np.stack([along[:, 1], -along[:, 0]], -1)
 
     @property
     def end_normals(self) -> np.ndarray:
         """Unit normals (N, 2, 2) at the start and at the end of each element."""
-        return (
-            np.repeat(self.normals[:, None], 2, 1)
-            if self.smooth_normals is None
-            else self.smooth_normals
-        )
+        if self.smooth_normals is None:
+            return np.repeat(self.normals[:, None], 2, 1)
+        return self.smooth_normals
+
+
+def _checked_normals(normals, elements: int) -> np.ndarray:
+    """Return normals (N, 2, 2) as an array; ValueError unless they are finite numbers
+    for this number of elements."""
+    normals = real_array("smooth_normals", normals)
+    require(
+        normals.shape == (elements, 2, 2) and bool(np.isfinite(normals).all()),
+        f"smooth_normals must be unit normals of shape ({elements}, 2, 2)",
+    )
+    return normals
 
 
 def _area(points) -> float:
-    """Return the enclosed area, m^2; positive if the points (N + 1, 2) run counter-clockwise."""
+    """Return the enclosed area, m^2; positive if the points (N + 1, 2) run
+    counter-clockwise."""
     x, z = points.T
     return float(np.sum(x[:-1] * z[1:] - x[1:] * z[:-1]) / 2)
 
@@ -123,25 +127,33 @@ def _cross(a, b):
 
 
 def _check_simple(points, closed: bool) -> None:
-    """Raise ValueError for elements of no length, elements that fold back onto the last, and elements that cross."""
+    """Raise ValueError for elements without length, for elements that fold back onto
+    the one before, and for elements that cross."""
     along = np.diff(points, axis=0)
-    lengths, size = np.hypot(*along.T), np.ptp(points, axis=0).max()
+    lengths = np.hypot(*along.T)
+    size = np.ptp(points, axis=0).max()
     short = np.flatnonzero(lengths <= 1e-12 * size)
     require(
         not short.size,
         f"points {short[:1]} and the next are the same",
         instead="keep one",
     )
-    last = along[1:] if not closed else np.roll(along, -1, 0)
-    first = along[:-1] if not closed else along
-    back = (np.abs(_cross(first, last)) <= 1e-12 * size**2) & (
-        (first * last).sum(-1) < 0
-    )
+
+    if closed:
+        before = along
+        after = np.roll(along, -1, 0)
+    else:
+        before = along[:-1]
+        after = along[1:]
+    is_parallel = np.abs(_cross(before, after)) <= 1e-12 * size**2
+    is_reversed = (before * after).sum(-1) < 0
+    folds = np.flatnonzero(is_parallel & is_reversed)
     require(
-        not back.any(),
-        f"the outline turns back onto itself after element {np.flatnonzero(back)[:1]}",
+        not folds.size,
+        f"the outline turns back onto itself after element {folds[:1]}",
         instead="drop the point there",
     )
+
     i, j = _crossings(points, along, closed)
     require(
         not i.size,
@@ -150,32 +162,40 @@ def _check_simple(points, closed: bool) -> None:
     )
 
 
-def _close(points, reach: float) -> np.ndarray:
-    """Return the pairs (2, K) of points at most ``reach`` from each other, as indices, the smaller first."""
-    if len(points) <= FEW_ELEMENTS:
+def _close_pairs(points, distance: float) -> np.ndarray:
+    """Return the pairs (2, K) of points at most a distance from each other, as indices,
+    the smaller first."""
+    if len(points) <= MOST_COMPARED:
         difference = points[:, None] - points
-        return np.array(
-            np.nonzero(
-                np.triu(np.hypot(difference[..., 0], difference[..., 1]) <= reach, 1)
-            )
-        )
+        distances = np.hypot(difference[..., 0], difference[..., 1])
+        return np.array(np.nonzero(np.triu(distances <= distance, 1)))
     from scipy.spatial import cKDTree
 
-    return cKDTree(points).query_pairs(reach, output_type="ndarray").T
+    return cKDTree(points).query_pairs(distance, output_type="ndarray").T
 
 
 def _crossings(points, along, closed: bool):
-    """Return the pairs of elements that cross or touch, but for neighbours; only elements with close middles can."""
-    i, j = _close(points[:-1] + along / 2, np.hypot(*along.T).max() * (1 + 1e-9))
-    no_neighbours = (j > i + 1) & ~((i == 0) & (j == len(along) - 1) & closed)
-    i, j = i[no_neighbours], j[no_neighbours]
-    a, d, b, e = points[i], along[i], points[j], along[j]
-    sides = (
-        _cross(d, b - a) * _cross(d, b + e - a),
-        _cross(e, a - b) * _cross(e, a + d - b),
-    )
-    overlap = (np.minimum(a, a + d) <= np.maximum(b, b + e)) & (
-        np.minimum(b, b + e) <= np.maximum(a, a + d)
-    )
-    crosses = overlap.all(-1) & (sides[0] <= 0) & (sides[1] <= 0)
+    """Return the pairs of elements that cross or touch, as two arrays of indices, but
+    for neighbours.
+
+    along: (N, 2), vectors from the start to the end of each element."""
+    # Only elements with close middles can cross.
+    reach = np.hypot(*along.T).max() * (1 + 1e-9)
+    i, j = _close_pairs(points[:-1] + along / 2, reach)
+    joined_by_ends = (i == 0) & (j == len(along) - 1) & closed
+    are_apart = (j > i + 1) & ~joined_by_ends
+    i = i[are_apart]
+    j = j[are_apart]
+
+    # Elements cross where each has the ends of the other on both its sides, or on it.
+    a = points[i]
+    d = along[i]
+    b = points[j]
+    e = along[j]
+    first_separates = _cross(d, b - a) * _cross(d, b + e - a) <= 0
+    second_separates = _cross(e, a - b) * _cross(e, a + d - b) <= 0
+    a_below_b = np.minimum(a, a + d) <= np.maximum(b, b + e)
+    b_below_a = np.minimum(b, b + e) <= np.maximum(a, a + d)
+    boxes_meet = (a_below_b & b_below_a).all(-1)
+    crosses = boxes_meet & first_separates & second_separates
     return i[crosses], j[crosses]

@@ -1,7 +1,7 @@
-"""Bodies as outlines, one class a kind; sizes in m.
+"""Bodies as outlines, one class per kind; sizes in m.
 
-The frame of rods, plates and wheels is at their centre, x forward and z up. The frame of a leg is at the hip; its free end
-is straight below, at z = -2 R.
+The frame of rods, plates and wheels is at their centre, x forward and z up. The frame
+of a leg is at the hip; its free end is straight below, at z = -2 R.
 """
 
 from __future__ import annotations
@@ -40,13 +40,15 @@ class Shape:
         check_numbers(self)
 
     def outline(self, elements: int = 100) -> Outline:
-        """Return the outline of about ``elements`` elements, at least as many as the shape needs."""
+        """Return the outline of about ``elements`` elements, at least as many as the
+        shape needs."""
         in_range("elements", elements, 1, MOST_ELEMENTS, whole=True)
         points, normals = self.curve(int(elements))
         return Outline(points, self.width, normals)
 
     def curve(self, elements: int):
-        """Return points (N + 1, 2), m, and smooth_normals (N, 2, 2) or None of an `Outline`."""
+        """Return points (N + 1, 2), m, and smooth_normals (N, 2, 2) or None of an
+        `Outline`."""
         raise NotImplementedError
 
 
@@ -92,7 +94,8 @@ class RoundRod(Shape):
 class HalfCylinder(Shape):
     """Half of a cylinder (Fig. 8(a)).
 
-    flat (-): where its flat side is, "down" or "up"; the frame is at the middle of that side.
+    flat (-): side on which it is flat, "down" or "up"; the frame is at the middle of
+    the flat side.
 
     Examples
     --------
@@ -114,16 +117,22 @@ class HalfCylinder(Shape):
         )
 
     def curve(self, elements: int):
-        round_part = max(FEWEST_ROUND // 2, round(elements * math.pi / (math.pi + 2)))
+        n_round = max(FEWEST_ROUND // 2, round(elements * math.pi / (math.pi + 2)))
+        n_flat = max(1, elements - n_round)
         begin = 0.0 if self.flat == "down" else math.pi
-        points, normals = _arc(self.radius, begin, begin + math.pi, round_part)
-        side = np.linspace(points[-1], points[0], max(1, elements - round_part) + 1)
-        sign = 1.0 if self.flat == "up" else -1.0
-        flat = np.broadcast_to([0.0, sign], (len(side) - 1, 2, 2))
+        points, normals = _arc(self.radius, begin, begin + math.pi, n_round)
+        side = np.linspace(points[-1], points[0], n_flat + 1)
+
+        # Roundoff must not tilt the flat side, nor leave a gap at its ends.
         side[:, 1] = 0.0
-        points[0, 1] = points[-1, 1] = 0.0
-        side[-1], side[0] = points[0], points[-1]
-        return np.concatenate([points, side[1:]]), np.concatenate([normals, flat])
+        points[[0, -1], 1] = 0.0
+        side[-1] = points[0]
+        side[0] = points[-1]
+
+        sign = 1.0 if self.flat == "up" else -1.0
+        side_normals = np.broadcast_to([0.0, sign], (n_flat, 2, 2))
+        points = np.concatenate([points, side[1:]])
+        return points, np.concatenate([normals, side_normals])
 
 
 @dataclass(frozen=True)
@@ -146,22 +155,24 @@ class SquareRod(Shape):
 
     def curve(self, elements: int):
         h = self.side / 2
-        return _subdivided(
-            np.array([[-h, -h], [h, -h], [h, h], [-h, h], [-h, -h]]), elements
-        ), None
+        corners = np.array([[-h, -h], [h, -h], [h, h], [-h, h], [-h, -h]])
+        return _subdivided(corners, elements), None
 
 
 @dataclass(frozen=True)
 class CLeg(Shape):
-    """A thin leg bent to an arc of a circle; hip and free end are 2 R from each other at any curvature (Fig. 12(c)).
+    """A thin leg bent to an arc of a circle; hip and free end are 2 R from each other
+    at any curvature (Fig. 12(c)).
 
-    A leg of positive curvature bulges backwards as it points down, and enters the grains with the bulge ahead as it turns
-    at a positive rate. The sign is assumed to be the paper's.
+    A leg of positive curvature that points down bulges backwards. Rotating at a
+    positive rate, it enters the grains with the bulge ahead. The sign is assumed to be
+    the paper's.
 
     Examples
     --------
     >>> from rft.terradynamics.plates import CLeg
-    >>> CLeg(radius=0.038, width=0.02).outline(24).points[[0, -1], 1].round(3)  # hip and free end, m
+    >>> leg = CLeg(radius=0.038, width=0.02).outline(24)
+    >>> leg.points[[0, -1], 1].round(3)  # hip and free end, m
     array([ 0.   , -0.076])
     """
 
@@ -171,21 +182,25 @@ class CLeg(Shape):
         float,
         Number(
             -1, 1, "-",
-            "R / r, r that of the arc: 1 for half a circle, 0 for a flat leg, negative for a reversed one, within +-1",
+            "R / r, r that of the arc: 1 for half a circle, 0 for a flat leg, negative "
+            "for a reversed one, within +-1",
         ),
     ] = 1.0  # fmt: skip
 
     def curve(self, elements: int):
-        c, s = self.relative_curvature, np.linspace(-1.0, 1.0, elements + 1)
+        c = self.relative_curvature
+        s = np.linspace(-1.0, 1.0, elements + 1)
         half = math.asin(c)  # half the angle of the arc
         angle = half * s
-        # sin(s asin c) / c and (cos(s asin c) - cos(asin c)) / c, both regular as c -> 0
-        along = np.sinc(angle / np.pi) * s * (half / c if c else 1.0)
-        across = (
-            2 * np.sin((half + angle) / 2) * np.sin((half - angle) / 2) / c
-            if c
-            else 0.0 * s
-        )
+
+        # along = sin(s asin c) / c and across = (cos(s asin c) - cos(asin c)) / c,
+        # without a loss of digits as c -> 0.
+        if c:
+            along = np.sinc(angle / np.pi) * s * (half / c)
+            across = 2 * np.sin((half + angle) / 2) * np.sin((half - angle) / 2) / c
+        else:
+            along = s
+            across = 0.0 * s
         points = self.radius * np.stack([-across, -1.0 - along], -1)
         normal = np.stack([-np.cos(angle), -np.sin(angle)], -1)
         return points, np.stack([normal[:-1], normal[1:]], 1)
@@ -198,7 +213,8 @@ class FlatLeg(Shape):
     Examples
     --------
     >>> from rft.terradynamics.plates import FlatLeg
-    >>> FlatLeg(radius=0.038, width=0.02).outline(4).points[:, 1].round(3)  # from the hip downwards, m
+    >>> leg = FlatLeg(radius=0.038, width=0.02).outline(4)
+    >>> leg.points[:, 1].round(3)  # from the hip downwards, m
     array([ 0.   , -0.019, -0.038, -0.057, -0.076])
     """
 
@@ -211,12 +227,14 @@ class FlatLeg(Shape):
 
 @dataclass(frozen=True)
 class Wheel(Shape):
-    """A wheel with or without lugs: straight bars that stand off its rim, equally spaced.
+    """A wheel with or without lugs: straight bars that stand off its rim, equally
+    spaced.
 
     Examples
     --------
     >>> from rft.terradynamics.plates import Wheel
-    >>> Wheel(radius=0.05, width=0.03, lugs=12, lug_height=0.01, lug_width=0.004).outline(200).closed
+    >>> wheel = Wheel(0.05, width=0.03, lugs=12, lug_height=0.01, lug_width=0.004)
+    >>> wheel.outline(200).closed
     True
     """
 
@@ -240,55 +258,53 @@ class Wheel(Shape):
         for name in ("lug_height", "lug_width"):
             in_range(name, getattr(self, name), 1e-6, LARGEST, unit="m")
         widest = 2 * self.radius * math.sin(math.pi / max(3, self.lugs))
-        required = f"lug_width must be below {widest:.3g} m, so that {self.lugs} lugs have room on the rim"
-        require(self.lug_width < widest, f"{required}, got {self.lug_width:g}")
+        require(
+            self.lug_width < widest,
+            f"lug_width must be below {widest:.3g} m, "
+            f"so that {self.lugs} lugs have room on the rim, got {self.lug_width:g}",
+        )
 
     def curve(self, elements: int):
         if not self.lugs:
             return _arc(self.radius, 0.0, 2 * math.pi, elements)
-        half = math.asin(
-            self.lug_width / (2 * self.radius)
-        )  # half the angle of a lug at the rim
-        pitch, top = (
-            2 * math.pi / self.lugs,
-            self.radius * math.cos(half) + self.lug_height,
-        )
+        pitch = 2 * math.pi / self.lugs
+        half = math.asin(self.lug_width / (2 * self.radius))  # half a lug's angle
+
+        # Elements are shared between the rim and the lugs by their lengths.
         rim = self.lugs * (pitch - 2 * half) * self.radius
         bars = self.lugs * (2 * self.lug_height + self.lug_width)
-        arc_elements = max(1, round(elements * rim / (rim + bars) / self.lugs))
-        bar = np.array(
-            [
-                [self.radius * math.cos(half), -1],
-                [top, -1],
-                [top, 1],
-                [self.radius * math.cos(half), 1],
-            ]
-        )
-        bar = _subdivided(
-            bar * [1.0, self.lug_width / 2],
-            max(3, round(elements * bars / (rim + bars) / self.lugs)),
-        )
-        points, normals = [], []
+        n_arc = max(1, round(elements * rim / (rim + bars) / self.lugs))
+        n_lug = max(3, round(elements * bars / (rim + bars) / self.lugs))
+        first_lug = _subdivided(self._lug_corners(half), n_lug)
+
+        points = []
+        normals = []
         for k in range(self.lugs):
-            cos, sin = math.cos(k * pitch), math.sin(k * pitch)
-            lug = bar @ np.array([[cos, sin], [-sin, cos]])
-            arc, arc_normals = _arc(
-                self.radius, k * pitch + half, (k + 1) * pitch - half, arc_elements
-            )
-            along = np.diff(lug, axis=0)
-            lug_normals = (
-                np.stack([along[:, 1], -along[:, 0]], -1) / np.hypot(*along.T)[:, None]
-            )
+            cos = math.cos(k * pitch)
+            sin = math.sin(k * pitch)
+            lug = first_lug @ np.array([[cos, sin], [-sin, cos]])
+            begin = k * pitch + half
+            end = (k + 1) * pitch - half
+            arc, arc_normals = _arc(self.radius, begin, end, n_arc)
             points += [lug, arc[1:-1]]
-            normals += [np.repeat(lug_normals[:, None], 2, 1), arc_normals]
+            normals += [np.repeat(_normals(lug)[:, None], 2, 1), arc_normals]
         return np.concatenate([*points, points[0][:1]]), np.concatenate(normals)
+
+    def _lug_corners(self, half: float) -> np.ndarray:
+        """Return the corners (4, 2) of the lug on +x, from -z to +z, m; ``half`` is
+        half of its angle at the rim."""
+        foot = self.radius * math.cos(half)
+        top = foot + self.lug_height
+        corners = np.array([[foot, -1], [top, -1], [top, 1], [foot, 1]])
+        return corners * [1.0, self.lug_width / 2]
 
 
 @dataclass(frozen=True)
 class Polygon(Shape):
     """Straight edges between points.
 
-    points (m): (x, z) of each. closed (-): the last point is joined to the first, and the body has an inside.
+    points (m): (x, z) of each. closed (-): the last point is joined to the first, and
+    the body has an inside.
 
     Examples
     --------
@@ -312,14 +328,17 @@ class Polygon(Shape):
 
 @dataclass(frozen=True)
 class Spline(Shape):
-    """A smooth curve through points: a cubic spline, its parameter the length of the chords.
+    """A smooth curve through points: a cubic spline whose parameter is the length of
+    the chords.
 
-    points (m): (x, z) of each. closed (-): the last point is joined to the first, and the body has an inside.
+    points (m): (x, z) of each. closed (-): the last point is joined to the first, and
+    the body has an inside.
 
     Examples
     --------
     >>> from rft.terradynamics.plates import Spline
-    >>> Spline(((0.01, 0.0), (0.0, 0.01), (-0.01, 0.0), (0.0, -0.01)), width=0.1).outline(40).closed
+    >>> points = ((0.01, 0.0), (0.0, 0.01), (-0.01, 0.0), (0.0, -0.01))
+    >>> Spline(points, width=0.1).outline(40).closed
     True
     """
 
@@ -331,66 +350,89 @@ class Spline(Shape):
         super().__post_init__()
         object.__setattr__(self, "points", _checked_points(self.points, self.closed))
         Polygon(self.points, self.width, self.closed)
-        self.outline(
-            min(4 * len(self.points), MOST_ELEMENTS)
-        )  # a spline may cross itself where its chords do not
+        # A spline may cross itself where its chords do not.
+        self.outline(min(4 * len(self.points), MOST_ELEMENTS))
 
     def curve(self, elements: int):
         from scipy.interpolate import CubicSpline
 
         points = _corners(self.points, self.closed)
-        s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-        spline = CubicSpline(
-            s, points, bc_type="periodic" if self.closed else "not-a-knot"
-        )
-        ends = np.linspace(0.0, s[-1], max(elements, FEWEST_ROUND) + 1)
-        curve, along = spline(ends), spline(ends, 1)
+        chords = np.hypot(*np.diff(points, axis=0).T)
+        s = np.concatenate([[0.0], np.cumsum(chords)])
+        ends = "periodic" if self.closed else "not-a-knot"
+        spline = CubicSpline(s, points, bc_type=ends)
+        s = np.linspace(0.0, s[-1], max(elements, FEWEST_ROUND) + 1)
+        curve = spline(s)
+        tangent = spline(s, 1)
         if self.closed:
-            curve[-1], along[-1] = curve[0], along[0]
-        normal = np.stack([along[:, 1], -along[:, 0]], -1) / np.hypot(*along.T)[:, None]
+            curve[-1] = curve[0]
+            tangent[-1] = tangent[0]
+
+        normal = _to_the_right(tangent) / np.hypot(*tangent.T)[:, None]
         normals = np.stack([normal[:-1], normal[1:]], 1)
         x, z = curve.T
         if self.closed and np.sum(x[:-1] * z[1:] - x[1:] * z[:-1]) < 0:
-            normals = (
-                -normals
-            )  # `Outline` reverses clockwise points; normals have to point outwards
+            # `Outline` reverses clockwise points; normals have to point outwards.
+            normals = -normals
         return curve, normals
 
 
 SHAPES = {
-    "plate": Plate, "round-rod": RoundRod, "half-cylinder": HalfCylinder, "square-rod": SquareRod, "c-leg": CLeg,
-    "flat-leg": FlatLeg, "wheel": Wheel, "polygon": Polygon, "spline": Spline,
-}  # fmt: skip
+    "plate": Plate,
+    "round-rod": RoundRod,
+    "half-cylinder": HalfCylinder,
+    "square-rod": SquareRod,
+    "c-leg": CLeg,
+    "flat-leg": FlatLeg,
+    "wheel": Wheel,
+    "polygon": Polygon,
+    "spline": Spline,
+}
+
+
+def _to_the_right(vectors: np.ndarray) -> np.ndarray:
+    """Return vectors (..., 2) rotated by a quarter turn to the right, with x to the
+    right and z up."""
+    return np.stack([vectors[..., 1], -vectors[..., 0]], -1)
+
+
+def _normals(points: np.ndarray) -> np.ndarray:
+    """Return the unit normals (N, 2) to the right of elements between points
+    (N + 1, 2)."""
+    along = np.diff(points, axis=0)
+    return _to_the_right(along) / np.hypot(*along.T)[:, None]
 
 
 def _arc(radius: float, begin: float, end: float, elements: int):
-    """Return points (N + 1, 2) and outward normals (N, 2, 2) of a counter-clockwise arc about the origin between two
-    angles, closed if it is a full circle."""
-    full_circle = end - begin > 6.28
-    angle = np.linspace(
-        begin, end, max(elements, FEWEST_ROUND if full_circle else 1) + 1
-    )
+    """Return points (N + 1, 2) and outward normals (N, 2, 2) of a counter-clockwise arc
+    about the origin between two angles, closed if it is a full circle."""
+    is_circle = end - begin > 6.28
+    fewest = FEWEST_ROUND if is_circle else 1
+    angle = np.linspace(begin, end, max(elements, fewest) + 1)
     normal = np.stack([np.cos(angle), np.sin(angle)], -1)
-    if full_circle:
+    if is_circle:
         normal[-1] = normal[0]
     return radius * normal, np.stack([normal[:-1], normal[1:]], 1)
 
 
 def _subdivided(points, elements: int):
-    """Return the ends of elements, equal on each edge, whose number is the edge's share of the length, rounded up."""
+    """Return the ends of about ``elements`` elements along edges between points (N, 2).
+
+    Elements are equal on each edge; their number is the edge's share of the length,
+    rounded up."""
     lengths = np.hypot(*np.diff(points, axis=0).T)
-    pieces = np.maximum(1, np.ceil(elements * lengths / lengths.sum() - 1e-9)).astype(
-        int
-    )
-    cut = [
-        np.linspace(a, b, k, endpoint=False)
-        for a, b, k in zip(points[:-1], points[1:], pieces)
+    shares = elements * lengths / lengths.sum()
+    counts = np.maximum(1, np.ceil(shares - 1e-9)).astype(int)
+    edges = [
+        np.linspace(start, end, count, endpoint=False)
+        for start, end, count in zip(points[:-1], points[1:], counts)
     ]
-    return np.concatenate([*cut, points[-1:]])
+    return np.concatenate([*edges, points[-1:]])
 
 
 def _checked_points(points, closed) -> tuple[tuple[float, float], ...]:
-    """Return the points as pairs of numbers, without a last one that repeats the first; ValueError for bad ones."""
+    """Return points as pairs of numbers, without a last one that repeats the first;
+    ValueError unless an outline can have them."""
     require(isinstance(closed, bool), "closed must be true or false", value=closed)
     array = real_array("points", points)
     require(
@@ -400,11 +442,10 @@ def _checked_points(points, closed) -> tuple[tuple[float, float], ...]:
     )
     if closed and len(array) > 1 and (array[0] == array[-1]).all():
         array = array[:-1]
-    fewest = 3 if closed else 2
     kind = "closed" if closed else "open"
-    valid = fewest <= len(array) <= MOST_POINTS
+    fewest = 3 if closed else 2
     require(
-        valid,
+        fewest <= len(array) <= MOST_POINTS,
         f"a {kind} outline takes {fewest} to {MOST_POINTS} points",
         value=len(array),
     )
@@ -415,7 +456,10 @@ def _checked_points(points, closed) -> tuple[tuple[float, float], ...]:
     return tuple(map(tuple, array.tolist()))
 
 
-def _corners(points, closed: bool):
-    """Return points (N, 2) as an array, the first once more at the end if the outline is closed."""
-    points = np.array(points)
-    return np.concatenate([points, points[:1]]) if closed else points
+def _corners(points, closed: bool) -> np.ndarray:
+    """Return points (N, 2) as an array, with the first again at the end if the outline
+    is closed."""
+    corners = np.array(points)
+    if closed:
+        return np.concatenate([corners, corners[:1]])
+    return corners

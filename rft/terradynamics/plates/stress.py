@@ -1,8 +1,10 @@
-"""Stress of grains on a plate in the vertical plane, per unit depth: the map alpha_x,z(beta, gamma) of Sec. II B and Fig. 7.
+"""Stress of grains on a plate in the vertical plane, per unit depth: the map
+alpha_x,z(beta, gamma) of Sec. II B and Fig. 7.
 
-Axes: x forward, z up, the surface at z = 0. beta: tilt of the plate, 0 lying flat, pi/2 upright; its leading normal is
-n = (sin beta, -cos beta). gamma: direction of motion below the horizontal, v = (cos gamma, -sin gamma). The force on an
-area A at depth |z| is |z| A (-alpha_x, alpha_z), alpha in N/cm^3 (Eq. 4).
+Axes: x forward, z up, the surface at z = 0. beta: tilt of the plate, 0 lying flat, pi/2
+upright; its leading normal is n = (sin beta, -cos beta). gamma: direction of motion
+below the horizontal, v = (cos gamma, -sin gamma). The force on an area A at depth |z|
+is |z| A (-alpha_x, alpha_z), alpha in N/cm^3 (Eq. 4).
 """
 
 from __future__ import annotations
@@ -19,9 +21,8 @@ from rft.formulas.vectors import absolute, formula, where
 
 PER_CUBIC_METRE = 1e6  # N/m^3 in one N/cm^3
 TENSION = ("keep", "cut")
-GRAZING = math.radians(
-    0.25
-)  # assumed; the drag of smooth rods is 0.2 % less than with a jump
+# Assumed; the drag of smooth rods is 0.2 % less than with a jump.
+GRAZING = math.radians(0.25)
 
 
 def _coefficient(meaning: str) -> Number:
@@ -42,16 +43,18 @@ Grazing = Annotated[
     float,
     Number(
         0, math.pi / 4, "rad",
-        "angle between motion and face over which the stress on the face of a closed body rises, from none where it "
-        "slides along itself to that of the map; 0 for a jump",
+        "angle between motion and face over which the stress on the face of a closed "
+        "body rises, from none where it slides along itself to that of the map; 0 for "
+        "a jump",
     ),
 ]  # fmt: skip
 
 
 @formula
 def alpha(law, n, v):
-    """Return (alpha_x, alpha_z), N/cm^3, for any unit normal n = (n_x, n_z) and unit velocity v = (v_x, v_z), from
-    `PlateStress.alpha_ahead` and the mirror symmetry of the map."""
+    """Return (alpha_x, alpha_z), N/cm^3, for any unit normal n = (n_x, n_z) and unit
+    velocity v = (v_x, v_z), from `PlateStress.alpha_ahead` and the mirror symmetry of
+    the map."""
     mirror = where(v[0] < 0.0, -1.0, 1.0)
     a_x, a_z = law.alpha_ahead((mirror * n[0], n[1]), (absolute(v[0]), v[1]))
     a_x = mirror * a_x
@@ -62,55 +65,64 @@ def alpha(law, n, v):
 
 
 class PlateStress:
-    """Base of stress maps. A map gives `alpha_ahead` for motion forwards, gamma within +-pi/2. All other directions follow
-    by mirror symmetry, and because a plate rotated by pi is the same plate:
+    """Base of stress maps.
 
-        alpha_z(beta, gamma) = alpha_z(-beta, +-pi - gamma),  alpha_x(beta, gamma) = -alpha_x(-beta, +-pi - gamma).
+    A map gives `alpha_ahead` for motion forwards, gamma within +-pi/2. All other
+    directions follow by mirror symmetry, and because a plate rotated by pi is the same
+    plate:
 
-    grazing: angle between motion and face, rad, over which the stress on the face of a closed body rises. A thin plate has
-    no jump where it slides along itself: its other face leads. tension: "keep" leaves the stress on faces that the map
-    pulls on instead of pushing, "cut" sets it to 0, which is nearer to what beds of grains bear in level motion.
+        alpha_x(beta, gamma) = -alpha_x(-beta, +-pi - gamma),
+        alpha_z(beta, gamma) = alpha_z(-beta, +-pi - gamma).
+
+    grazing: angle between motion and face, rad, over which the stress on the face of a
+    closed body rises. A thin plate has no jump where it slides along itself: its other
+    face leads. tension: "keep" leaves the stress on faces that the map pulls on instead
+    of pushing, "cut" sets it to 0, which is nearer to what beds of grains bear in level
+    motion.
 
     Examples
     --------
     >>> import math
     >>> from rft.terradynamics.plates import VERTICAL
     >>> stress = VERTICAL["poppy-seeds-loose"].stress
-    >>> [round(float(x), 3) for x in stress(0.0, math.pi / 2)]  # alpha_x, alpha_z of a level plate pushed down, N/cm^3
-    [0.0, 0.254]
+    >>> alpha_x, alpha_z = stress(0.0, math.pi / 2)  # a level plate pushed down, N/cm^3
+    >>> round(float(alpha_x), 3), round(float(alpha_z), 3)
+    (0.0, 0.254)
     """
 
     grazing: float
     tension: str
 
     def alpha_ahead(self, n, v) -> tuple[np.ndarray, np.ndarray]:
-        """Return (alpha_x, alpha_z), N/cm^3, for unit normals n = (n_x, n_z), either of the plate's two, and unit
-        velocities v = (v_x, v_z) with v_x >= 0."""
+        """Return (alpha_x, alpha_z), N/cm^3, for unit normals n = (n_x, n_z), either of
+        the plate's two, and unit velocities v = (v_x, v_z) with v_x >= 0."""
         raise NotImplementedError
 
     def __call__(self, beta, gamma) -> tuple[np.ndarray, np.ndarray]:
-        """Return (alpha_x, alpha_z), N/cm^3, for angles in radians, of any size, that broadcast together."""
-        beta, gamma = real_array("beta", beta), real_array("gamma", gamma)
-        return self.alpha(
-            (np.sin(beta), -np.cos(beta)), (np.cos(gamma), -np.sin(gamma))
-        )
+        """Return (alpha_x, alpha_z), N/cm^3, for angles in radians, of any size, that
+        broadcast together."""
+        beta = real_array("beta", beta)
+        gamma = real_array("gamma", gamma)
+        n = np.sin(beta), -np.cos(beta)
+        v = np.cos(gamma), -np.sin(gamma)
+        return self.alpha(n, v)
 
     def alpha(self, n, v) -> tuple[np.ndarray, np.ndarray]:
-        """Return (alpha_x, alpha_z), N/cm^3, for unit normals n = (n_x, n_z) and unit velocities v = (v_x, v_z), pairs of
-        arrays."""
+        """Return (alpha_x, alpha_z), N/cm^3, for unit normals n = (n_x, n_z) and unit
+        velocities v = (v_x, v_z), pairs of arrays."""
         return alpha(self, n, v)
 
     @property
     def cut(self) -> float:
-        """1 if faces that the map pulls on have no stress, else 0."""
+        """1.0 if faces that the map pulls on bear no stress, else 0.0."""
         return float(self.tension == "cut")
 
     def _check(self) -> None:
         """Raise ValueError for numbers out of range and for an unknown tension."""
         check_numbers(self)
-        valid = isinstance(self.tension, str) and self.tension in TENSION
+        is_known = isinstance(self.tension, str) and self.tension in TENSION
         require(
-            valid,
+            is_known,
             f"tension must be {' or '.join(map(repr, TENSION))}",
             value=self.tension,
         )
@@ -121,16 +133,19 @@ class StressMap(PlateStress):
     """The map as nine Fourier coefficients in N/cm^3, times zeta:
 
         alpha_z = sum A_mn cos(2 m beta + n gamma) + B_mn sin(2 m beta + n gamma),
-        alpha_x = sum C_mn cos(2 m beta + n gamma) + D_mn sin(2 m beta + n gamma),  m in -1, 0, 1 and n in 0, 1.
+        alpha_x = sum C_mn cos(2 m beta + n gamma) + D_mn sin(2 m beta + n gamma)
 
-    The defaults are the generic set M0. Source: Li, Zhang and Goldman, Science 339, 1408 (2013), Table S2; Fig. 7 of Zhang
-    and Goldman (2014).
+    with m in -1, 0, 1 and n in 0, 1.
+
+    The defaults are the generic set M0. Source: Li, Zhang and Goldman, Science 339,
+    1408 (2013), Table S2; Fig. 7 of Zhang and Goldman (2014).
 
     Examples
     --------
     >>> import math
     >>> from rft.terradynamics.plates import StressMap
-    >>> alpha_x, alpha_z = StressMap(zeta=0.5)(0.0, math.pi / 2)  # a level plate pushed down, N/cm^3
+    >>> stress = StressMap(zeta=0.5)
+    >>> alpha_x, alpha_z = stress(0.0, math.pi / 2)  # a level plate pushed down, N/cm^3
     >>> round(float(alpha_z), 3)
     0.5
     """
@@ -153,15 +168,16 @@ class StressMap(PlateStress):
 
     @formula
     def alpha_ahead(self, n, v):
-        cos_2b, sin_2b = n[1] * n[1] - n[0] * n[0], -2.0 * n[0] * n[1]
-        cos_g, sin_g = v[0], -v[1]
-        # sin(gamma +- 2 beta) = cos_sin +- sin_cos, cos(gamma +- 2 beta) = cos_cos -+ sin_sin
-        cos_sin, sin_cos, cos_cos, sin_sin = (
-            cos_2b * sin_g,
-            sin_2b * cos_g,
-            cos_2b * cos_g,
-            sin_2b * sin_g,
-        )
+        cos_2b = n[1] * n[1] - n[0] * n[0]
+        sin_2b = -2.0 * n[0] * n[1]
+        cos_g = v[0]
+        sin_g = -v[1]
+        # sin(gamma +- 2 beta) = cos_sin +- sin_cos
+        # cos(gamma +- 2 beta) = cos_cos -+ sin_sin
+        cos_sin = cos_2b * sin_g
+        sin_cos = sin_2b * cos_g
+        cos_cos = cos_2b * cos_g
+        sin_sin = sin_2b * sin_g
         a_z = (
             self.A00
             + self.A10 * cos_2b

@@ -1,4 +1,5 @@
-"""Survey of a stress map over all tilts and directions: where it dissipates power, and where it pulls."""
+"""Survey of a stress map over all tilts and directions: where it dissipates power, and
+where it pulls."""
 
 from __future__ import annotations
 
@@ -11,11 +12,12 @@ from rft.terradynamics.plates.stress import PlateStress
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """A map over all tilts and directions, before any cut of tension.
+    """A stress map over all tilts and directions, before any cut of tension.
 
-    beta: (B,), within +-pi/2, and gamma: (G,), within +-pi, rad, midpoints of equal cells. alpha_x, alpha_z, normal,
-    power: (B, G), N/cm^3. normal: stress along the leading normal, positive where the grains pull. power: power of the
-    stress at unit speed, negative where the grains dissipate, as they should.
+    beta: (B,), within +-pi/2, and gamma: (G,), within +-pi, rad, midpoints of equal
+    cells. alpha_x, alpha_z, normal, power: (B, G), N/cm^3. normal: stress along the
+    leading normal, positive where the grains pull. power: power of the stress at unit
+    speed, negative where the grains dissipate, as they should everywhere.
 
     Examples
     --------
@@ -39,21 +41,24 @@ class Survey:
 
     @property
     def pushing(self) -> float:
-        """Share of the plane (beta, gamma) where the map drives the motion, which no ground can."""
+        """Share of the plane (beta, gamma) where the map drives the motion, which no
+        ground can."""
         return float((self.power > 0.0).mean())
 
     def description(self) -> str:
         """Return one line on where the map drives motion and where it pulls."""
-        pulls = (
-            f"pulls on {100 * self.pulling:.1f} % of the plane"
-            if self.pulling
-            else "pulls nowhere"
-        )
+        pulls = "pulls nowhere"
+        if self.pulling:
+            pulls = f"pulls on {100 * self.pulling:.1f} % of the plane"
         if not self.pushing:
             return f"takes power at all angles, {pulls}"
-        b, g = np.unravel_index(self.power.argmax(), self.power.shape)
-        most = f"most at beta = {np.degrees(self.beta[b]):.0f}, gamma = {np.degrees(self.gamma[g]):.0f} degrees"
-        return f"drives motion on over {100 * self.pushing:.1f} % of the plane, {most}; {pulls}"
+        row, column = np.unravel_index(self.power.argmax(), self.power.shape)
+        beta = np.degrees(self.beta[row])
+        gamma = np.degrees(self.gamma[column])
+        return (
+            f"drives motion on over {100 * self.pushing:.1f} % of the plane, "
+            f"most at beta = {beta:.0f}, gamma = {gamma:.0f} degrees; {pulls}"
+        )
 
 
 def survey(stress: PlateStress, cells: int = 180) -> Survey:
@@ -68,11 +73,13 @@ def survey(stress: PlateStress, cells: int = 180) -> Survey:
     """
     beta = (np.arange(cells) + 0.5) / cells * np.pi - np.pi / 2
     gamma = (np.arange(2 * cells) + 0.5) / cells * np.pi - np.pi
-    n, v = (
-        (np.sin(beta)[:, None], -np.cos(beta)[:, None]),
-        (np.cos(gamma), -np.sin(gamma)),
-    )
-    a_x, a_z = replace(stress, tension="keep").alpha(n, v)
-    leading = np.sign((n[0] * v[0] + n[1] * v[1]).round(12))  # 0 at grazing incidence
-    normal, power = leading * (n[1] * a_z - n[0] * a_x), v[1] * a_z - v[0] * a_x
+    n_x = np.sin(beta)[:, None]
+    n_z = -np.cos(beta)[:, None]
+    v_x = np.cos(gamma)
+    v_z = -np.sin(gamma)
+    a_x, a_z = replace(stress, tension="keep").alpha((n_x, n_z), (v_x, v_z))
+    # The sign of the normal that leads; 0 where a plate slides along itself.
+    leading = np.sign((n_x * v_x + n_z * v_z).round(12))
+    normal = leading * (n_z * a_z - n_x * a_x)
+    power = v_z * a_z - v_x * a_x
     return Survey(beta, gamma, a_x, a_z, normal, power)
