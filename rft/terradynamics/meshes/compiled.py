@@ -1,4 +1,5 @@
-"""The contact of faces with the ground in compiled code, eight faces at once. Importing this module loads numba."""
+"""The contact of faces with the ground in compiled code, eight faces at once. Importing
+this module loads numba."""
 
 from __future__ import annotations
 
@@ -22,31 +23,30 @@ from rft.terradynamics.meshes.contact import (
     velocity_of_middle,
 )
 from rft.terradynamics.meshes.triples import dot, plus
-from rft.terradynamics.meshes.zones import share_in, shared
 
-(read_face, _) = record_access(Face)
+read_face, _ = record_access(Face)
 
 
 @register_jitable
-def on_faces(law, ground, table, begin, end, motion, zones=None, zone=-1, place=None):
-    """Return force, N, and moment about the origin, N m, on the faces in rows ``begin`` to ``end`` of a table (R, 14, 8),
-    along the axes of their body; of their share in a zone, unless it is negative."""
+def load_on_faces(law, ground, table, begin, end, motion):
+    """Return force, N, and moment about the origin, N m, on the faces in rows ``begin``
+    to ``end`` of a table (R, 14, 8), along the axes of their body."""
     zero = 0.0 * read(table[begin], 0)
-    force, moment = (zero, zero, zero), (zero, zero, zero)
+    force = (zero, zero, zero)
+    moment = (zero, zero, zero)
     for k in range(begin, end):
         face = read_face(table[k], 0)
         heights = corner_heights(face, motion)
         if any_of((heights[0] < 0.0) | (heights[1] < 0.0) | (heights[2] < 0.0)):
-            part, sheet = part_below(face, heights), face.sheet > 0.0
-            if zones is not None:  # noqa: SIM102, a branch that the compiler drops
-                if zone >= 0:
-                    part = shared(part, share_in(zones, zone, face, place))
+            part = part_below(face, heights)
+            is_sheet = face.sheet > 0.0
             v = velocity_of_middle(part, motion)
-            if any_of(
-                ((dot(part.n, v) >= 0.0) | sheet) & (absolute(part.depth) > 0.0)
-            ):  # others bear nothing
-                f, m, _ = load(law, ground, part, motion, v, sheet)
-                force, moment = plus(force, f), plus(moment, m)
+            leads = (dot(part.n, v) >= 0.0) | is_sheet
+            # Rows of which no face is below the surface and leads bear nothing.
+            if any_of(leads & (absolute(part.depth) > 0.0)):
+                f, m, _ = load(law, ground, part, motion, v, is_sheet)
+                force = plus(force, f)
+                moment = plus(moment, m)
     return (
         (sum_of(force[0]), sum_of(force[1]), sum_of(force[2])),
         (sum_of(moment[0]), sum_of(moment[1]), sum_of(moment[2])),
@@ -55,7 +55,8 @@ def on_faces(law, ground, table, begin, end, motion, zones=None, zone=-1, place=
 
 @functools.cache
 def kernel(Law: type):
-    """Return the compiled function that adds up loads by laws whose records have one class."""
+    """Return the compiled function that adds up loads by laws whose records have one
+    class."""
     register_formulas()
 
     @njit(nogil=True, error_model="numpy")
@@ -88,7 +89,7 @@ def kernel(Law: type):
                     (ahead[b, c, 0], ahead[b, c, 1], ahead[b, c, 2]),
                     height[b, c],
                 )
-                force, moment = on_faces(
+                force, moment = load_on_faces(
                     law, ground, table, first[b], first[b + 1], motion
                 )
                 out[b, c, 0], out[b, c, 1], out[b, c, 2] = force
@@ -100,8 +101,12 @@ def kernel(Law: type):
 def sum_loads(
     law, ground: Ground, table: np.ndarray, first: np.ndarray, motions: Motion
 ) -> np.ndarray:
-    """Return (B, C, 6): the same as `rft.terradynamics.meshes.blocks.Blocks.loads`, by the record of a law."""
-    out, numbers = np.empty((*motions.height.shape, 6)), tuple(map(float, ground[:-1]))
-    arrays = (np.ascontiguousarray(x, float) for x in motions)
-    kernel(type(law))(tuple(law), numbers, ground.disturbed, table, first, *arrays, out)
+    """Return (B, C, 6): the same as `rft.terradynamics.meshes.blocks.Blocks.loads`, by
+    the record of a law."""
+    add_up = kernel(type(law))
+    law_numbers = tuple(law)
+    ground_numbers = tuple(map(float, ground[:-1]))
+    arrays = [np.ascontiguousarray(x, float) for x in motions]
+    out = np.empty((*motions.height.shape, 6))
+    add_up(law_numbers, ground_numbers, ground.disturbed, table, first, *arrays, out)
     return out

@@ -1,9 +1,10 @@
-"""The contact of triangles with the ground: meshes, hulls, legs and geoms of three dimensions.
+"""The contact of triangles with the ground: meshes, hulls, legs and geoms in three
+dimensions.
 
 On the part of a face below the surface the stress is that of
-`rft.terradynamics.ground.base` with one alpha, that of the velocity of the part's
-middle; |z| and its moments are integrated exactly. Vectors are triples along any axes.
-All functions but the last two are formulas (`rft.formulas.vectors`): they take numbers,
+`rft.terradynamics.ground.base`, with the alpha of the velocity at the part's middle;
+|z| and its moments are integrated exactly. Vectors are triples along any axes. All
+functions but the last two are formulas (`rft.formulas.vectors`): they take numbers,
 arrays that broadcast, and the vectors of compiled code."""
 
 from __future__ import annotations
@@ -30,19 +31,23 @@ from rft.terradynamics.meshes.triples import (
 
 
 class FaceLaw(Protocol):
-    """A law of three dimensions. grazing_sine: sine of the grazing angle. traction and lead are formulas; numbers: those
-    that they read."""
+    """A law of three dimensions.
+
+    grazing_sine: sine of the grazing angle. numbers: the numbers that the formulas
+    read. The methods are formulas."""
 
     grazing_sine: float
     numbers: dict[str, float]
 
     def traction(self, n, v, up=UP) -> tuple:
-        """Return the force per area and depth, N/m^3, on faces with outward unit normals n and unit velocities v, whether
-        or not they lead; ``up`` is the unit vector upwards."""
+        """Return the force per area and depth, N/m^3, on faces with outward unit
+        normals n and unit velocities v, whether or not they lead; ``up`` is the unit
+        vector upwards."""
         ...
 
     def traction_slope(self, n, v, up, k) -> tuple:
-        """Return the slope of ``traction`` by the component of v along k, linear in k."""
+        """Return the slope of ``traction`` by the component of v along k, linear in
+        k."""
         ...
 
     def lead_slope(self, n_dot_v, grazing_sine, sheet=False) -> Any:
@@ -56,8 +61,11 @@ class FaceLaw(Protocol):
 
 
 class Face(NamedTuple):
-    """Corners (x, y, z) of a triangle and its outward unit normal, in the frame of its body, m; its area, m^2, negative
-    where the corners run clockwise about the normal; 1 for a face of a thin sheet, of which either side may lead, else 0."""
+    """A triangle in the frame of its body.
+
+    x1 to z3: corners (x, y, z), m. nx, ny, nz: outward unit normal. area: m^2, negative
+    where the corners run clockwise about the normal. sheet: 1 for a face of a thin
+    sheet, of which either side may lead, else 0."""
 
     x1: float
     y1: float
@@ -76,8 +84,11 @@ class Face(NamedTuple):
 
 
 class Part(NamedTuple):
-    """The parts of faces below the surface. n: outward unit normal. middle: from the origin, m. area: m^2. depth:
-    integral of |z| over the part, m^3. arms: integral of |z| times the vector from the origin, m^4."""
+    """The part of a face below the surface.
+
+    n: outward unit normal. middle: from the origin, m. area: m^2. depth: integral of
+    |z| over the part, m^3. arms: integral of |z| times the vector from the origin,
+    m^4."""
 
     n: tuple
     middle: tuple
@@ -87,9 +98,11 @@ class Part(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Motion of a body. velocity: of the origin, m/s. spin: angular velocity, rad/s. x, height: of the origin along the
-    world's x axis and above the surface, m. up, ahead: unit vectors upwards and along the world's x axis. All vectors are
-    along the same axes."""
+    """Motion of a body; all vectors are along the same axes.
+
+    velocity: of the origin, m/s. spin: angular velocity, rad/s. x, height: of the
+    origin along the world's x axis and above the surface, m. up, ahead: unit vectors
+    upwards and along the world's x axis."""
 
     velocity: tuple
     spin: tuple
@@ -102,53 +115,50 @@ class Motion(NamedTuple):
 @formula
 def corner_heights(face, motion):
     """Return the heights, m, of a face's corners above the surface."""
-    up, height = motion.up, motion.height
+    up = motion.up
     return (
-        height + dot(up, (face.x1, face.y1, face.z1)),
-        height + dot(up, (face.x2, face.y2, face.z2)),
-        height + dot(up, (face.x3, face.y3, face.z3)),
+        motion.height + dot(up, (face.x1, face.y1, face.z1)),
+        motion.height + dot(up, (face.x2, face.y2, face.z2)),
+        motion.height + dot(up, (face.x3, face.y3, face.z3)),
+    )
+
+
+@formula
+def corners_and_normal(face):
+    """Return the three corners of a face, m, and its outward unit normal."""
+    return (
+        (face.x1, face.y1, face.z1),
+        (face.x2, face.y2, face.z2),
+        (face.x3, face.y3, face.z3),
+        (face.nx, face.ny, face.nz),
     )
 
 
 @formula
 def part_below(face, heights):
-    """Return the `Part` of a face below the surface, from the heights of its corners, m."""
+    """Return the `Part` of a face below the surface, from the heights of its corners,
+    m."""
     share, middle, moments = part_of_triangle(-heights[0], -heights[1], -heights[2])
-    a, b, c = (
-        (face.x1, face.y1, face.z1),
-        (face.x2, face.y2, face.z2),
-        (face.x3, face.y3, face.z3),
-    )
+    a, b, c, n = corners_and_normal(face)
     depth = face.area * (moments[0] + moments[1] + moments[2])
     arms = times(face.area, weighted(moments, a, b, c))
-    return Part(
-        (face.nx, face.ny, face.nz),
-        weighted(middle, a, b, c),
-        face.area * share,
-        depth,
-        arms,
-    )
+    return Part(n, weighted(middle, a, b, c), face.area * share, depth, arms)
 
 
 @formula
 def whole_part(face, heights):
-    """Return `part_below` of a face that is below the surface as a whole."""
-    a, b, c = (
-        (face.x1, face.y1, face.z1),
-        (face.x2, face.y2, face.z2),
-        (face.x3, face.y3, face.z3),
-    )
-    d1, d2, d3 = -heights[0], -heights[1], -heights[2]
-    total, third = d1 + d2 + d3, 1.0 / 3.0
+    """Return `part_below` of a face that is entirely below the surface."""
+    a, b, c, n = corners_and_normal(face)
+    d1 = -heights[0]
+    d2 = -heights[1]
+    d3 = -heights[2]
+    total = d1 + d2 + d3
+    third = 1.0 / 3.0
     moments = (d1 + total) / 12.0, (d2 + total) / 12.0, (d3 + total) / 12.0
+    middle = weighted((third, third, third), a, b, c)
     depth = face.area * (moments[0] + moments[1] + moments[2])
-    return Part(
-        (face.nx, face.ny, face.nz),
-        weighted((third, third, third), a, b, c),
-        face.area,
-        depth,
-        times(face.area, weighted(moments, a, b, c)),
-    )
+    arms = times(face.area, weighted(moments, a, b, c))
+    return Part(n, middle, face.area, depth, arms)
 
 
 @formula
@@ -159,55 +169,70 @@ def velocity_of_middle(part, motion):
 
 @formula
 def load(law, ground, part, motion, v, sheet):
-    """Return force, N, moment about the origin, N m, and stress per depth, N/m^3, of the grains on a part of a face.
+    """Return force, N, moment about the origin, N m, and stress per depth, N/m^3, of
+    the grains on a part of a face.
 
-    v: `velocity_of_middle`. sheet: whether the face is one of a thin sheet, of which either side may lead."""
-    n, speed, across = part.n, sqrt(dot(v, v)), dot(part.n, v)
+    v: `velocity_of_middle`. sheet: whether the face is one of a thin sheet, of which
+    either side may lead."""
+    n = part.n
+    speed = sqrt(dot(v, v))
+    across = dot(n, v)
     slowness = inverse_speed(ground, speed)
     unit = times(1.0 / where(speed == 0.0, 1.0, speed), v)
+
     share = speed * slowness * law.lead(across * slowness, ground.grazing_sine, sheet)
     if ground.downhill_loss == 0.0 and len(ground.disturbed) == 0:
         share = share * ground.strength
     else:
-        share = share * strength_at(
-            ground, motion.x + dot(motion.ahead, part.middle), dot(motion.ahead, unit)
-        )
+        x = motion.x + dot(motion.ahead, part.middle)
+        share = share * strength_at(ground, x, dot(motion.ahead, unit))
     stress = times(share, law.traction(n, unit, motion.up))
-    force, moment = times(part.depth, stress), cross(part.arms, stress)
+    force = times(part.depth, stress)
+    moment = cross(part.arms, stress)
+
     if ground.flux != 0.0:
         across = where(sheet, across, maximum(across, 0.0))
         push = times(ground.flux * across * absolute(across) * part.area, n)
-        force, moment = minus(force, push), minus(moment, cross(part.middle, push))
+        force = minus(force, push)
+        moment = minus(moment, cross(part.middle, push))
     return force, moment, stress
 
 
-class Stressed(NamedTuple):
-    """What the slopes of the stress on a part follow from. unit: of the velocity. full: the traction with the strength, N/m^3.
-    by_unit, by_n: slopes of its share, s/m, along the velocity and the normal. turned: of its direction, s/m. strength,
-    loss: of the ground and, relative, by motion ahead. flow: flux x area x speed across, kg/s."""
+class SlopeTerms(NamedTuple):
+    """Terms of the slopes of a part's load by its velocity (see `load_with_slopes`).
+
+    unit: of the velocity. full_traction: with the ground's strength, N/m^3. by_unit,
+    by_n: slopes of the share of the traction, s/m, along the velocity and along the
+    normal.
+    by_direction: slope of the load by the direction of the traction, s/m. strength: of
+    the ground. loss: relative loss of the strength by motion ahead. flow: flux x area x
+    speed across, kg/s."""
 
     unit: tuple
-    full: tuple
+    full_traction: tuple  # compiled code takes ``traction`` for a law's formula
     by_unit: float
     by_n: float
-    turned: float
+    by_direction: float
     strength: float
     loss: float
     flow: float
 
 
 @formula
-def _slopes_along(law, part, motion, state, k):
-    """Return the slopes of force and moment by the component of the velocity along the unit vector k."""
-    u_k, n_k = dot(state.unit, k), dot(part.n, k)
-    sideways = minus(k, times(u_k, state.unit))
-    share = state.by_unit * u_k + state.by_n * n_k
-    share = share - state.turned * state.loss * dot(motion.ahead, sideways)
-    turning = law.traction_slope(part.n, state.unit, motion.up, sideways)
+def _slopes_along(law, part, motion, terms, k):
+    """Return the slopes of force and moment by the component of the velocity along the
+    unit vector k."""
+    u_k = dot(terms.unit, k)
+    n_k = dot(part.n, k)
+    sideways = minus(k, times(u_k, terms.unit))
+    share = terms.by_unit * u_k + terms.by_n * n_k
+    share = share - terms.by_direction * terms.loss * dot(motion.ahead, sideways)
+    turning = law.traction_slope(part.n, terms.unit, motion.up, sideways)
     slope = plus(
-        times(share, state.full), times(state.turned * state.strength, turning)
+        times(share, terms.full_traction),
+        times(terms.by_direction * terms.strength, turning),
     )
-    push = times(2.0 * state.flow * n_k, part.n)
+    push = times(2.0 * terms.flow * n_k, part.n)
     return (
         minus(times(part.depth, slope), push),
         minus(cross(part.arms, slope), cross(part.middle, push)),
@@ -216,39 +241,56 @@ def _slopes_along(law, part, motion, state, k):
 
 @formula
 def load_with_slopes(law, ground, part, motion, v, sheet):
-    """Return force and moment of `load`, and their slopes by the components x, y, z of v: three triples each.
+    """Return force and moment of `load`, and their slopes by the components x, y, z of
+    v: three triples each.
 
-    With s = 1 / sqrt(v^2 + rounding^2), the unit vector u of v and x = s n . v, the stress is S = |v| s lead(x) T(u), so
-    that dS = T (lead s (1 - |v|^2 s^2) u . dv + |v| s lead' dx) + s lead dT (dv - u u . dv),   dx = s (n - x |v| s u) . dv.
+    With s = 1 / sqrt(v^2 + rounding^2), the unit vector u of v and x = s n . v, the
+    stress is S = |v| s lead(x) T(u), so that
+
+        dS = T (lead s (1 - |v|^2 s^2) u . dv + |v| s lead' dx)
+             + s lead dT (dv - u u . dv),
+        dx = s (n - x |v| s u) . dv.
     """
-    n, speed, across = part.n, sqrt(dot(v, v)), dot(part.n, v)
+    n = part.n
+    speed = sqrt(dot(v, v))
+    across = dot(n, v)
     slowness = inverse_speed(ground, speed)
     unit = times(1.0 / where(speed == 0.0, 1.0, speed), v)
-    moved, leading = speed * slowness, across * slowness
+    rounded_speed = speed * slowness  # |v| s
+    leading = across * slowness  # x
     lead = law.lead(leading, ground.grazing_sine, sheet)
     lead_slope = law.lead_slope(leading, ground.grazing_sine, sheet)
-    strength, loss = ground.strength, 0.0
+
+    strength = ground.strength
+    loss = 0.0
     if not (ground.downhill_loss == 0.0 and len(ground.disturbed) == 0):
         along = dot(motion.ahead, unit)
         strength = strength_at(ground, motion.x + dot(motion.ahead, part.middle), along)
         lost = maximum(ground.downhill_loss * along, 0.0)
         loss = where(lost > 0.0, ground.downhill_loss / (1.0 - lost), 0.0)
     traction = times(strength, law.traction(n, unit, motion.up))
-    stress = times(moved * lead, traction)
-    force, moment = times(part.depth, stress), cross(part.arms, stress)
-    by_n = moved * lead_slope * slowness
-    by_unit = lead * slowness * (1.0 - moved * moved) - by_n * leading * moved
+    stress = times(rounded_speed * lead, traction)
+    force = times(part.depth, stress)
+    moment = cross(part.arms, stress)
+
+    by_n = rounded_speed * lead_slope * slowness
+    by_unit = lead * slowness * (1.0 - rounded_speed * rounded_speed)
+    by_unit = by_unit - by_n * leading * rounded_speed
+
     flow = 0.0 * across
     if ground.flux != 0.0:
         flow = ground.flux * part.area * where(sheet, across, maximum(across, 0.0))
         push = times(flow * absolute(across), n)
-        force, moment = minus(force, push), minus(moment, cross(part.middle, push))
-    state = Stressed(
-        unit, traction, by_unit, by_n, lead * slowness, strength, loss, absolute(flow)
+        force = minus(force, push)
+        moment = minus(moment, cross(part.middle, push))
+
+    by_direction = lead * slowness
+    terms = SlopeTerms(
+        unit, traction, by_unit, by_n, by_direction, strength, loss, absolute(flow)
     )
-    fx, mx = _slopes_along(law, part, motion, state, AXES[0])
-    fy, my = _slopes_along(law, part, motion, state, AXES[1])
-    fz, mz = _slopes_along(law, part, motion, state, AXES[2])
+    fx, mx = _slopes_along(law, part, motion, terms, AXES[0])
+    fy, my = _slopes_along(law, part, motion, terms, AXES[1])
+    fz, mz = _slopes_along(law, part, motion, terms, AXES[2])
     return force, moment, (fx, fy, fz), (mx, my, mz)
 
 
@@ -257,21 +299,17 @@ def record(law: FaceLaw):
     names = "traction", "traction_slope", "lead", "lead_slope"
     formulas = tuple((name, getattr(type(law), name)) for name in names)
     numbers = law_numbers(law)
-    return record_class(type(law).__name__, tuple(numbers), formulas)(*numbers.values())
+    Record = record_class(type(law).__name__, tuple(numbers), formulas)
+    return Record(*numbers.values())
 
 
 def faces(
     corners: np.ndarray, normals: np.ndarray, sheet: np.ndarray | bool = False
 ) -> Face:
-    """Return the faces (T,) with corners (T, 3, 3), m, and outward unit normals (T, 3)."""
+    """Return the faces (T,) with corners (T, 3, 3), m, and outward unit normals (T, 3).
+    sheet: whether they belong to a thin sheet, of which either side may lead."""
     a, b, c = corners.swapaxes(0, 1)
     across = np.cross(b - a, c - a)
     area = np.copysign(np.linalg.norm(across, axis=1) / 2, (across * normals).sum(1))
-    return Face(
-        *a.T,
-        *b.T,
-        *c.T,
-        *normals.T,
-        area,
-        np.broadcast_to(sheet, area.shape).astype(float),
-    )
+    is_sheet = np.broadcast_to(sheet, area.shape).astype(float)
+    return Face(*a.T, *b.T, *c.T, *normals.T, area, is_sheet)

@@ -1,10 +1,12 @@
-"""Vectors of three components: triples of numbers, of arrays, or of the vectors of compiled code. All are formulas."""
+"""Vectors of three components: triples of numbers, of arrays, or of the vectors of
+compiled code. All are formulas."""
 
 from __future__ import annotations
 
 from rft.formulas.vectors import formula
 
-UP, AHEAD = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
+UP = (0.0, 0.0, 1.0)
+AHEAD = (1.0, 0.0, 0.0)
 AXES = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
@@ -44,5 +46,5 @@ def minus(a, b):
 
 @formula
 def weighted(weights, a, b, c):
-    """Return the sum of three triples with these weights."""
+    """Return the sum of three triples a, b, c with three weights."""
     return plus(plus(times(weights[0], a), times(weights[1], b)), times(weights[2], c))

@@ -15,7 +15,7 @@ from rft.formulas.simd import load as read
 from rft.terradynamics.ground import Ground
 from rft.terradynamics.plates.contact import Element, Force, Motion, load
 
-(read_element, _) = record_access(Element)
+read_element, _ = record_access(Element)
 
 
 @register_jitable
