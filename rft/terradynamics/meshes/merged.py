@@ -1,9 +1,10 @@
 """Meshes of many small triangles as fewer faces that bear nearly the same.
 
-Neighbouring triangles that point nearly the same way become one face. It has their area vector (the sum of area times
-normal), their middle and their extent, as the second moments of area tell it, and it lies as far out as keeps their share
-of the enclosed volume: where the stress per depth is the same all over, the force is the volume's. Faces of that kind do
-not meet at edges; forces are sums over faces, so that they need not."""
+Neighbouring triangles that point nearly the same way become one face. It has the sum of
+their area vectors (area times normal), their middle, and their extent by the second
+moments of area. It lies so far out that it keeps their share of the enclosed volume:
+where the stress per depth is the same all over, the force is the volume's. Such faces
+do not meet at edges. They need not, because forces are sums over faces."""
 
 from __future__ import annotations
 
@@ -13,22 +14,26 @@ from rft.core.refusal import require
 from rft.terradynamics.meshes.mesh import Mesh
 
 SPREAD = 0.2  # between normals of one face, along each axis: some 11 degrees
-MANY, WIDER = (
-    1000,
-    0.4,
-)  # faces from which on errors of single ones average out, and their spread
-LONGEST = 1.5  # edges over the length asked for, above which triangles are halved
+# From this number of faces on, errors of single ones average out, and normals may
+# differ by more.
+MANY = 1000
+SPREAD_OF_MANY = 0.4
+LONGEST = 1.5  # edges over the wanted length, above which triangles are halved
 SMALL = 0.1  # area over the square of that length, below which triangles are merged
 SLENDER = 0.75  # edges over that length, above which triangles to be merged are halved
-FILLED = 8.0  # square of the distance of the corners of a triangle whose variance is 1
+# Square of the distance of a triangle's corners from its middle, if its variance is 1.
+CORNERS = 8.0
 
 
 def resized(mesh: Mesh, length: float, most: int) -> Mesh:
-    """Return a mesh whose faces have edges of about ``length``, m, as a list of triangles that need not meet.
+    """Return a mesh whose faces have edges of about ``length``, m, as a list of
+    triangles that need not meet.
 
-    Large triangles are halved across their longest edges, again and again; small ones are merged. The mesh is returned as
-    it is where neither happens. Refusal for more than ``most`` triangles on the way."""
-    corners, normals = mesh.vertices[mesh.faces], _corner_normals(mesh)
+    Large triangles are halved across their longest edges, again and again; small ones
+    are merged. Where neither happens, the mesh itself is returned. Refusal for more
+    than ``most`` triangles on the way."""
+    corners = mesh.vertices[mesh.faces]
+    normals = _corner_normals(mesh)
     is_long = _is_long(corners, length)
     is_changed = bool(is_long.any())
     while is_long.any():
@@ -41,16 +46,17 @@ def resized(mesh: Mesh, length: float, most: int) -> Mesh:
         is_long = _is_long(corners, length)
     normals = normals.sum(1)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+
     is_small = _areas(corners) < SMALL * length**2
     if is_small.any():
-        merged = _merged(corners[is_small], normals[is_small], length)
-        if len(merged[0]) < is_small.sum():
+        merged, merged_normals = _merged(corners[is_small], normals[is_small], length)
+        if len(merged) < is_small.sum():
             is_changed = True
-            corners = np.concatenate([corners[~is_small], merged[0]])
-            normals = np.concatenate([normals[~is_small], merged[1]])
+            corners = np.concatenate([corners[~is_small], merged])
+            normals = np.concatenate([normals[~is_small], merged_normals])
     if not is_changed:
         return mesh
-    return _of_triangles(mesh, corners, normals)
+    return _separate_triangles(mesh, corners, normals)
 
 
 def _corner_normals(mesh: Mesh) -> np.ndarray:
@@ -74,14 +80,16 @@ def _is_long(corners: np.ndarray, length: float) -> np.ndarray:
 
 
 def _halved(corners, normals, is_long) -> tuple[np.ndarray, np.ndarray]:
-    """Return corners and normals there, (F, 3, 3), with some triangles halved across their longest edges."""
+    """Return corners and normals there, (F, 3, 3), with some triangles halved across
+    their longest edges."""
     long = corners[is_long]
     edges = np.linalg.norm(np.roll(long, -1, 1) - long, axis=-1)  # from each corner on
     order = (edges.argmax(1)[:, None] + np.arange(3)) % 3
     out = []
     for values in (corners, normals):
-        turned = np.take_along_axis(values[is_long], order[:, :, None], 1)
-        a, b, c = turned.swapaxes(0, 1)
+        # The longest edge is the one from a to b.
+        ordered = np.take_along_axis(values[is_long], order[:, :, None], 1)
+        a, b, c = ordered.swapaxes(0, 1)
         middle = (a + b) / 2
         halves = [np.stack([a, middle, c], 1), np.stack([middle, b, c], 1)]
         out.append(np.concatenate([values[~is_long], *halves]))
@@ -89,72 +97,85 @@ def _halved(corners, normals, is_long) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _merged(corners, normals, length: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return corners (G, 3, 3) and normals (G, 3) of faces in place of triangles with normals (F, 3)."""
-    area, middle = _areas(corners), corners.mean(1)
+    """Return corners (G, 3, 3) and normals (G, 3) of faces that stand for triangles
+    with normals (F, 3)."""
+    area = _areas(corners)
+    middle = corners.mean(1)
     group = _groups(middle, normals, length, SPREAD)
     if group.max() >= MANY:
-        group = _groups(middle, normals, length, WIDER)
-    count = group.max() + 1
+        group = _groups(middle, normals, length, SPREAD_OF_MANY)
+    n_groups = group.max() + 1
 
     def total(values):
-        out = np.zeros((count, *values.shape[1:]))
+        out = np.zeros((n_groups, *values.shape[1:]))
         np.add.at(out, group, values)
         return out
 
     vector = total(area[:, None] * normals)
     size = np.linalg.norm(vector, axis=1)
     n = vector / size[:, None]
-    place = total(area[:, None] * middle) / total(area)[:, None]
+    total_area = total(area)
+
+    # The middle, moved along the normal to where the face keeps the enclosed volume.
+    place = total(area[:, None] * middle) / total_area[:, None]
     volume = total(area * (normals * middle).sum(1))
     place += ((volume - (vector * place).sum(1)) / size)[:, None] * n
-    arms = corners - place[group][:, None]
-    whole = 3.0 * arms.mean(1)
+
     # The second moments of a triangle's area, by its corners and its middle.
-    moments = np.einsum("fki,fkj->fij", arms, arms) + whole[:, :, None] * whole[:, None]
-    moments = total(area[:, None, None] * moments / 12.0) / total(area)[:, None, None]
+    arms = corners - place[group][:, None]
+    arm_of_middle = 3.0 * arms.mean(1)
+    moments = np.einsum("fki,fkj->fij", arms, arms)
+    moments = moments + arm_of_middle[:, :, None] * arm_of_middle[:, None]
+    moments = total(area[:, None, None] * moments / 12.0) / total_area[:, None, None]
     return _triangles_of(place, n, size, moments), n
 
 
 def _triangles_of(place, n, area, moments) -> np.ndarray:
-    """Return corners (G, 3, 3) of triangles with middles, normals and second moments (G, 3, 3), scaled to their areas."""
-    flat = np.eye(3) - n[:, :, None] * n[:, None]
-    variance, axes = np.linalg.eigh(flat @ moments @ flat)
+    """Return corners (G, 3, 3) of triangles with middles and normals (G, 3), second
+    moments (G, 3, 3) within their planes, and areas (G,)."""
+    plane = np.eye(3) - n[:, :, None] * n[:, None]
+    variance, axes = np.linalg.eigh(plane @ moments @ plane)
     variance = np.maximum(variance[:, 1:], 1e-6 * variance[:, 2:])
     first, second = np.moveaxis(axes[:, :, 1:], 2, 0)
-    is_turned = (np.cross(first, second) * n).sum(1) < 0.0
-    second = np.where(is_turned[:, None], -second, second)
-    lengths = np.sqrt(FILLED * variance)
-    of_them = 3**1.5 / 4 * lengths.prod(1)
-    lengths *= np.sqrt(area / of_them)[:, None]
+    runs_clockwise = (np.cross(first, second) * n).sum(1) < 0.0
+    second = np.where(runs_clockwise[:, None], -second, second)
+
+    lengths = np.sqrt(CORNERS * variance)
+    area_by_moments = 3**1.5 / 4 * lengths.prod(1)
+    lengths *= np.sqrt(area / area_by_moments)[:, None]
     corners = []
     for angle in 2 * np.pi / 3 * np.arange(3):
-        x, y = np.cos(angle) * lengths[:, :1], np.sin(angle) * lengths[:, 1:]
+        x = np.cos(angle) * lengths[:, :1]
+        y = np.sin(angle) * lengths[:, 1:]
         corners.append(place + x * first + y * second)
     return np.stack(corners, 1)
 
 
 def _groups(middle, normals, length: float, spread: float) -> np.ndarray:
-    """Return the group (F,) of each triangle: halved along the widest extent until all are narrower than ``length`` and
-    normals less than ``spread`` apart."""
+    """Return the group (F,) of each triangle: halved along the widest extent until all
+    are narrower than ``length`` and their normals differ by less than ``spread``."""
     features = np.concatenate([middle / length, normals / spread], 1)
-    group, count = np.zeros(len(features), np.int64), 0
+    group = np.zeros(len(features), np.int64)
+    n_groups = 0
     waiting = [np.arange(len(features))]
     while waiting:
         index = waiting.pop()
         own = features[index]
-        low, high = own.min(0), own.max(0)
+        low = own.min(0)
+        high = own.max(0)
         along = int((high - low).argmax())
         if high[along] - low[along] <= 1.0:
-            group[index] = count
-            count += 1
+            group[index] = n_groups
+            n_groups += 1
             continue
         is_low = own[:, along] < (low[along] + high[along]) / 2
         waiting += [index[is_low], index[~is_low]]
     return group
 
 
-def _of_triangles(mesh: Mesh, corners: np.ndarray, normals: np.ndarray) -> Mesh:
-    """Return a mesh of triangles that need not meet, as closed as the mesh that they are made from."""
+def _separate_triangles(mesh: Mesh, corners: np.ndarray, normals: np.ndarray) -> Mesh:
+    """Return a mesh of triangles (G, 3, 3) that need not meet, as closed as ``mesh``,
+    for which they stand."""
     faces = np.arange(3 * len(corners)).reshape(-1, 3)
-    smooth = np.repeat(normals[:, None], 3, axis=1)
-    return mesh._copy(corners.reshape(-1, 3), faces, smooth)
+    corner_normals = np.repeat(normals[:, None], 3, axis=1)
+    return mesh._copy(corners.reshape(-1, 3), faces, corner_normals)

@@ -1,4 +1,4 @@
-"""Solid bodies as meshes, one class a kind; sizes in m."""
+"""Solid bodies as meshes, one class per kind; sizes in m."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from rft.terradynamics.meshes.files import read
 from rft.terradynamics.meshes.mesh import MOST_TRIANGLES, Mesh, mirrored, quartered
 from rft.terradynamics.meshes.smooth import smooth
 
-FINEST = (
-    327_680  # triangles of the mesh that stands for the truth in studies of accuracy
-)
+# Triangles of the finest mesh in studies of accuracy, which stands for the exact
+# surface.
+FINEST = 327_680
 HANDS = ("right", "left")
 MOST_TURNS = 100  # of a thread: more turns need more than `MOST_TRIANGLES` triangles
 
@@ -39,24 +39,30 @@ class Solid:
         check_numbers(self)
 
     def mesh(self, triangles: int = 5000) -> Mesh:
-        """Return the mesh of about ``triangles`` triangles, at least as many as the body needs, with smooth normals."""
+        """Return the mesh of about ``triangles`` triangles, at least as many as the
+        body needs, with smooth normals."""
         in_range("triangles", triangles, 1, MOST_TRIANGLES, whole=True)
         mesh = self.build(int(triangles))
-        return smooth(mesh) if mesh.smooth_normals is None else mesh
+        if mesh.smooth_normals is None:
+            return smooth(mesh)
+        return mesh
 
     def build(self, triangles: int) -> Mesh:
-        """Return the mesh, of flat triangles or with the normals of the body's exact surface."""
+        """Return the mesh, of flat triangles or with the normals of the body's exact
+        surface."""
         raise NotImplementedError
 
     @property
     def ladder(self) -> tuple[int, ...]:
-        """Numbers of triangles that a study of accuracy computes with, the last of them for the truth."""
-        return (*(80 * 4**k for k in range(5)), FINEST)
+        """Numbers of triangles with which a study of accuracy computes; the results of
+        the last stand for the exact ones."""
+        return 80, 320, 1280, 5120, 20_480, FINEST
 
 
 @dataclass(frozen=True)
 class Sphere(Solid):
-    """A ball about the origin, of 20, 80, 320, ..., or 327680 triangles: the least that are enough for ``triangles``.
+    """A ball about the origin, of 20, 80, 320, ..., or 327680 triangles: the least of
+    these numbers that is at least ``triangles``.
 
     Examples
     --------
@@ -70,14 +76,12 @@ class Sphere(Solid):
     def mesh(self, triangles: int = 5000) -> Mesh:
         in_range("triangles", triangles, 1, MOST_TRIANGLES, whole=True)
         flat = self.build(int(triangles))
-        return dataclasses.replace(
-            flat, smooth_normals=flat.vertices[flat.faces] / self.radius
-        )
+        normals = flat.vertices[flat.faces] / self.radius
+        return dataclasses.replace(flat, smooth_normals=normals)
 
     def build(self, triangles: int) -> Mesh:
-        return shapes.sphere(
-            self.radius, min(7, max(0, math.ceil(math.log(triangles / 20, 4) - 0.01)))
-        )
+        fineness = math.ceil(math.log(triangles / 20, 4) - 0.01)
+        return shapes.sphere(self.radius, min(7, max(0, fineness)))
 
 
 @dataclass(frozen=True)
@@ -106,14 +110,17 @@ class Cylinder(Solid):
 
 @dataclass(frozen=True)
 class Screw(Solid):
-    """An Archimedean screw along x, about the origin: a core with one thread, which is a blade or has a smooth profile.
+    """An Archimedean screw along x, about the origin: a core with one thread, which is
+    a blade or has a smooth profile.
 
-    handed (-): "right", which drives to +x as it turns about +x by the right hand, or "left", its mirror image.
+    handed (-): "right", which drives to +x as it rotates about +x by the right hand, or
+    "left", its mirror image.
 
     Examples
     --------
     >>> from rft.terradynamics.meshes import Screw
-    >>> Screw(radius=0.03, core=0.02, pitch=0.06, length=0.2, thickness=0.004).mesh(2000).closed
+    >>> screw = Screw(0.03, core=0.02, pitch=0.06, length=0.2, thickness=0.004)
+    >>> screw.mesh(2000).closed
     True
     """
 
@@ -124,14 +131,16 @@ class Screw(Solid):
     thickness: Annotated[
         float,
         metres(
-            "thickness of the blade along x, less than the pitch; 0 for a thread of a smooth profile",
+            "thickness of the blade along x, less than the pitch; 0 for a thread of a "
+            "smooth profile",
             0,
         ),
     ] = 0.0
     nose: Annotated[
         float,
         metres(
-            "length of a cone at either end of the core, beyond the thread; 0 for flat ends",
+            "length of a cone at either end of the core, beyond the thread; 0 for flat "
+            "ends",
             0,
         ),
     ] = 0.0
@@ -143,11 +152,12 @@ class Screw(Solid):
             self.core < self.radius,
             f"core must be less than the radius, got {self.core:g} and {self.radius:g}",
         )
-        message = (
-            "thickness must be 0, or from a thousandth of the pitch to less than that"
+        is_allowed = 1e-3 * self.pitch <= self.thickness < self.pitch
+        require(
+            self.thickness == 0 or is_allowed,
+            "thickness must be 0, or from a thousandth of the pitch to less than that, "
+            f"got {self.thickness:g} and {self.pitch:g}",
         )
-        within = self.thickness == 0 or 1e-3 * self.pitch <= self.thickness < self.pitch
-        require(within, f"{message}, got {self.thickness:g} and {self.pitch:g}")
         require(
             self.handed in HANDS,
             f"handed must be one of {', '.join(HANDS)}",
@@ -172,48 +182,46 @@ class Screw(Solid):
     @property
     def mirrored(self) -> Screw:
         """The screw of the other hand."""
-        return dataclasses.replace(
-            self, handed="left" if self.handed == "right" else "right"
-        )
+        handed = "left" if self.handed == "right" else "right"
+        return dataclasses.replace(self, handed=handed)
 
     def build(self, triangles: int) -> Mesh:
-        right = self._bladed(triangles) if self.thickness else self._smooth(triangles)
-        return right if self.handed == "right" else mirrored(right)
+        if self.thickness:
+            mesh = self._with_blade(triangles)
+        else:
+            mesh = self._with_smooth_thread(triangles)
+        if self.handed == "left":
+            return mirrored(mesh)
+        return mesh
 
-    def _smooth(self, triangles: int) -> Mesh:
+    def _with_smooth_thread(self, triangles: int) -> Mesh:
         """Return the right-handed screw with a thread of a smooth profile."""
         size = math.sqrt(
             4 * math.pi * self.core * (self.length + 2 * self.core) / triangles
         )
-        counts = _divisions(
-            size,
-            (2 * math.pi * self.core, 12),
-            (self.length, 4),
-            (math.hypot(self.core, self.nose), 1),
-        )
+        around = 2 * math.pi * self.core
+        slant = math.hypot(self.core, self.nose)  # from the rim of an end to its middle
+        counts = _divisions(size, (around, 12), (self.length, 4), (slant, 1))
         return shapes.screw(
             self.radius, self.core, self.pitch, self.length, *counts, self.nose
         )
 
-    def _bladed(self, triangles: int) -> Mesh:
+    def _with_blade(self, triangles: int) -> Mesh:
         """Return the right-handed screw whose thread is a blade."""
-        high, slope = self.radius - self.core, 2 * math.pi * self.radius / self.pitch
-        edge, slant = (
-            self.length * math.hypot(1.0, slope),
-            math.hypot(self.core, self.nose),
-        )
-        sides = (
-            edge * (2 * math.pi * self.core + 2 * high + self.thickness)
-            + 2 * math.pi * self.core * slant
-        )
-        lengths = (
-            (2 * math.pi * self.core, 8),
+        around = 2 * math.pi * self.core
+        slope = 2 * math.pi * self.radius / self.pitch
+        high = self.radius - self.core
+        edge = self.length * math.hypot(1.0, slope)
+        slant = math.hypot(self.core, self.nose)  # from the rim of an end to its middle
+        area = edge * (around + 2 * high + self.thickness) + around * slant
+        counts = _divisions(
+            math.sqrt(2 * area / triangles),
+            (around, 8),
             (edge, 8),
             (slant, 1),
             (high, 1),
             (self.thickness * slope, 1),
         )
-        counts = _divisions(math.sqrt(2 * sides / triangles), *lengths)
         return blade(
             self.radius,
             self.core,
@@ -227,7 +235,8 @@ class Screw(Solid):
 
 @dataclass(frozen=True)
 class Leg(Solid):
-    """The c-leg of the vertical plane, extruded across it: hip at the origin, free end at z = -2 R.
+    """The c-leg of the vertical plane, extruded across it: hip at the origin, free end
+    at z = -2 R.
 
     Examples
     --------
@@ -243,19 +252,24 @@ class Leg(Solid):
         float,
         Number(
             -1, 1, "-",
-            "R / r, -1 to 1, 1 for half a circle with its bulge to -x, ahead where a positive rate about y sweeps the leg "
-            "backwards",
+            "R / r, -1 to 1, 1 for half a circle with its bulge to -x, ahead where a "
+            "positive rate about y sweeps the leg backwards",
         ),
     ] = 1.0  # fmt: skip
 
     def __post_init__(self):
         super().__post_init__()
-        message = f"thickness must be less than the radius, got {self.thickness:g} and {self.radius:g}"
-        require(self.thickness < self.radius, message)
+        require(
+            self.thickness < self.radius,
+            "thickness must be less than the radius, "
+            f"got {self.thickness:g} and {self.radius:g}",
+        )
 
     def build(self, triangles: int) -> Mesh:
         bend = math.asin(abs(self.relative_curvature))
-        length = 2 * self.radius * (bend / math.sin(bend) if bend else 1.0)
+        length = 2 * self.radius
+        if bend:
+            length *= bend / math.sin(bend)
         size = math.sqrt(4 * length * (self.width + self.thickness) / triangles)
         counts = _divisions(size, (length, 4), (self.width, 1), (self.thickness, 1))
         return shapes.leg(
@@ -267,11 +281,13 @@ class Leg(Solid):
 class MeshFile(Solid):
     """The mesh of an STL, OBJ or PLY file (needs trimesh), in its own frame.
 
-    file (-): name of the file; in a scene file, from the scene's folder. closed (-): whether the mesh must have an inside;
-    of an open one either side may lead. smooth (-): whether the triangles stand for a curved surface, with edges where they
-    meet at more than 40 degrees.
+    file (-): name of the file; in a scene file, from the scene's folder. closed (-):
+    whether the mesh must have an inside; of an open one either side may lead. smooth
+    (-): whether the triangles stand for a curved surface, with edges where they meet at
+    more than 40 degrees.
 
-    For more triangles than the file has, each is cut in four; the form stays.
+    Where more triangles are wanted than the file has, each is cut in four; the form
+    stays the same.
     """
 
     file: str
@@ -300,8 +316,11 @@ class MeshFile(Solid):
             value=self.smooth,
         )
         mesh = read(self.file, self.closed, self.scale)
-        mesh = smooth(mesh) if self.smooth else mesh
-        object.__setattr__(self, "_mesh", mesh if self.closed else mesh.two_sided)
+        if self.smooth:
+            mesh = smooth(mesh)
+        if not self.closed:
+            mesh = mesh.two_sided
+        object.__setattr__(self, "_mesh", mesh)
 
     def mesh(self, triangles: int = 5000) -> Mesh:
         in_range("triangles", triangles, 1, MOST_TRIANGLES, whole=True)
@@ -313,19 +332,21 @@ class MeshFile(Solid):
     @property
     def ladder(self) -> tuple[int, ...]:
         coarsest = len(self._mesh.faces)
-        ladder = [
-            coarsest * 4**k
-            for k in range(8)
-            if coarsest * 4**k <= max(FINEST, coarsest)
-        ]
-        return tuple(ladder) if len(ladder) > 1 else (coarsest, coarsest)
+        ladder = [coarsest]
+        while 4 * ladder[-1] <= FINEST and len(ladder) < 8:
+            ladder.append(4 * ladder[-1])
+        if len(ladder) == 1:
+            return coarsest, coarsest
+        return tuple(ladder)
 
 
 SOLIDS = {"sphere": Sphere, "cylinder": Cylinder, "screw": Screw, "c-leg": Leg}
 
 
 def _divisions(size: float, *lengths: tuple[float, int]) -> list[int]:
-    """Return the number of pieces of about ``size``, m, in each length, at least the number given with it."""
+    """Return the numbers of pieces of about ``size``, m, into which lengths, m, are
+    cut.
+    lengths: pairs of a length and its least number of pieces."""
     return [
         int(np.clip(round(length / size), fewest, 4096)) for length, fewest in lengths
     ]
