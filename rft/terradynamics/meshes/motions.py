@@ -1,7 +1,9 @@
-"""Prescribed motions of rigid bodies, one class a kind. SI units; x forwards, z up, the surface at z = 0.
+"""Prescribed motions of rigid bodies, one class per kind. SI units; x forwards, z up,
+the surface at z = 0.
 
-Rotations are right-handed about their axes: about y, a body that hangs down and rotates at a positive rate sweeps backwards.
-A heading is the direction of motion along the ground, rad from x towards y.
+Rotations are right-handed about their axes: about y, a body that hangs down and rotates
+at a positive rate sweeps backwards. A heading is the direction of motion along the
+ground, rad from x towards y.
 """
 
 from __future__ import annotations
@@ -14,17 +16,19 @@ import numpy as np
 
 from rft.core.checks import Number, check_numbers, real_array
 from rft.core.metres import LARGEST, metres
-from rft.core.refusal import require
+from rft.core.refusal import Refusal, require
 from rft.terradynamics.meshes.mesh import Mesh
 from rft.terradynamics.prescribed import (
     FARTHEST,
-    MOST_SAMPLES,
     Depth,
     Direction,
     Distance,
     Height,
     Motion,
     Samples,
+    require_ascending,
+    require_path_length,
+    set_numbers,
 )
 
 if TYPE_CHECKING:
@@ -52,14 +56,17 @@ Angle = Annotated[
 
 
 class Trajectory(NamedTuple):
-    """A motion in time, in the world. t: (T,), s. place: (T, 3), of the origin, m. rotation: (T, 3, 3). velocity: (T, 3), of
-    the origin, m/s. spin: (T, 3), angular velocity, rad/s. angle: (T,), rad, of a body that rotates about one axis, else
-    0.
+    """A motion in time, in the world.
+
+    t: (T,), s. place: (T, 3), of the origin, m. rotation: (T, 3, 3), from the body's
+    axes to the world's. velocity: (T, 3), of the origin, m/s. spin: (T, 3), angular
+    velocity, rad/s. angle: (T,), rad, of a body that rotates about one axis, else 0.
 
     Examples
     --------
     >>> from rft.terradynamics.meshes import Drag, Sphere
-    >>> motion = Drag(depth=0.05, distance=0.1, samples=3).trajectory(Sphere(0.02).mesh(80))
+    >>> ball = Sphere(0.02).mesh(80)
+    >>> motion = Drag(depth=0.05, distance=0.1, samples=3).trajectory(ball)
     >>> motion.place, motion.spin.shape
     (array([[ 0.  ,  0.  , -0.05],
            [ 0.05,  0.  , -0.05],
@@ -76,7 +83,7 @@ class Trajectory(NamedTuple):
 
 @dataclass(frozen=True)
 class Drag(Motion):
-    """Motion along a straight line without turning.
+    """Motion along a straight line without rotation.
 
     attitude (rad): orientation of the body, a rotation vector, or an angle about y.
 
@@ -107,7 +114,8 @@ class Drag(Motion):
 
 @dataclass(frozen=True)
 class Penetrate(Motion):
-    """Motion straight down, or on a slope, from where the lowest point touches the surface.
+    """Motion straight or obliquely down, from where the lowest point touches the
+    surface.
 
     attitude (rad): orientation of the body, a rotation vector, or an angle about y.
 
@@ -139,10 +147,11 @@ class Penetrate(Motion):
 
 @dataclass(frozen=True)
 class Rotate(Motion):
-    """Rotation about an axis through the origin, at a fixed height above the surface, which may also move along the ground.
+    """Rotation about an axis through the origin, at a fixed height above the surface;
+    the origin may move along the ground.
 
-    axis (-): direction of the axis, of any length but 0. attitude (rad): orientation of the body at angle 0, a rotation
-    vector, or an angle about y.
+    axis (-): direction of the axis, of any length but 0. attitude (rad): orientation of
+    the body at angle 0, a rotation vector, or an angle about y.
 
     Examples
     --------
@@ -177,10 +186,9 @@ class Rotate(Motion):
         check_numbers(self)
         self.require_turning()
         axis = real_array("axis", self.axis)
-        size = float(np.linalg.norm(axis)) if axis.shape == (3,) else 0.0
-        valid = 1e-9 < size < 1e9
+        is_vector = axis.shape == (3,)
         require(
-            valid,
+            is_vector and 1e-9 < float(np.linalg.norm(axis)) < 1e9,
             "axis must be three numbers that are not all 0, such as [0, 1, 0]",
             value=self.axis,
         )
@@ -193,31 +201,26 @@ class Rotate(Motion):
         angle = np.linspace(self.start, self.stop, self.samples)
         t = (angle - self.start) / self.rate
         rotation = rotations(angle[:, None] * axis).as_matrix() @ _matrix(self.attitude)
-        velocity = np.broadcast_to(
-            self.speed * _unit_vector(self.heading, 0.0), rotation.shape[:2]
-        )
+        spin = np.broadcast_to(self.rate * axis, (len(t), 3))
+        velocity = self.speed * _unit_vector(self.heading, 0.0)
+        velocity = np.broadcast_to(velocity, (len(t), 3))
         place = velocity * t[:, None] + [0.0, 0.0, self.hub_height]
-        return Trajectory(
-            t,
-            place,
-            rotation,
-            velocity,
-            np.broadcast_to(self.rate * axis, velocity.shape),
-            angle,
-        )
+        return Trajectory(t, place, rotation, velocity, spin, angle)
 
 
 @dataclass(frozen=True)
 class Path(Motion):
-    """Motion through given poses. Velocities and spins are differences of order 2 in the spacing of t.
+    """Motion through given poses. Velocities and spins are differences of order 2 in
+    the spacing of t.
 
-    t (s): times, ascending. x, y, z (m): of the origin. rx, ry, rz (rad): rotation vectors, all or none; from one pose to the
-    next the body turns by less than 2 rad.
+    t (s): times, ascending. x, y, z (m): of the origin. rx, ry, rz (rad): rotation
+    vectors, all or none; from one pose to the next the body rotates by less than 2 rad.
 
     Examples
     --------
     >>> from rft.terradynamics.meshes import Path, Sphere
-    >>> path = Path(t=(0.0, 1.0, 2.0), x=(0.0, 0.01, 0.02), y=(0.0, 0.0, 0.0), z=(-0.05, -0.05, -0.05))
+    >>> still, deep = (0.0, 0.0, 0.0), (-0.05, -0.05, -0.05)
+    >>> path = Path(t=(0.0, 1.0, 2.0), x=(0.0, 0.01, 0.02), y=still, z=deep)
     >>> path.trajectory(Sphere(0.02).mesh(80)).velocity[0].round(3)  # m/s
     array([0.01, 0.  , 0.  ])
     """
@@ -231,40 +234,30 @@ class Path(Motion):
     rz: tuple[float, ...] = ()
 
     def __post_init__(self):
-        for name in ("t", "x", "y", "z", "rx", "ry", "rz"):
-            values = real_array(name, getattr(self, name))
-            require(values.ndim == 1, f"{name} must be a list of numbers")
-            object.__setattr__(self, name, tuple(values.tolist()))
-            largest, unit = {
-                "x": (FARTHEST, " m"),
-                "y": (FARTHEST, " m"),
-                "z": (LARGEST, " m"),
-            }.get(name, (1e9, ""))
-            within = bool((np.abs(values) <= largest).all())
-            require(within, f"{name} must be finite and within {largest:g}{unit}")
+        set_numbers(self, "t", 1e9)
+        set_numbers(self, "x", FARTHEST, " m")
+        set_numbers(self, "y", FARTHEST, " m")
+        set_numbers(self, "z", LARGEST, " m")
+        for name in ("rx", "ry", "rz"):
+            set_numbers(self, name, 1e9)
+        require_path_length(self.t)
+        are_equal = len(self.x) == len(self.y) == len(self.z) == len(self.t)
+        n_rotations = {len(self.rx), len(self.ry), len(self.rz)}
+        all_or_none = n_rotations in ({0}, {len(self.t)})
         require(
-            3 <= len(self.t) <= MOST_SAMPLES,
-            f"a path takes 3 to {MOST_SAMPLES} poses",
-            value=len(self.t),
+            are_equal and all_or_none, "t, x, y, z and rx, ry, rz must be equally many"
         )
-        same = len(self.x) == len(self.y) == len(self.z) == len(self.t)
-        all_or_none = {len(self.rx), len(self.ry), len(self.rz)} in ({0}, {len(self.t)})
-        require(same and all_or_none, "t, x, y, z and rx, ry, rz must be equally many")
-        late = np.flatnonzero(np.diff(self.t) <= 0)
-        require(
-            not late.size,
-            f"t must ascend, but t = {(self.t[late[0]] if late.size else 0):g} is not before the next",
-        )
+        require_ascending(self.t)
+
         rotation = self._rotations()
-        wide = np.flatnonzero(
-            (rotation[1:] * rotation[:-1].inv()).magnitude() >= WIDEST
-        )
-        after = f"after t = {self.t[wide[0]] if wide.size else 0:g}"
-        require(
-            not wide.size,
-            f"the body turns by {WIDEST:g} rad or more {after}",
-            instead="give poses between",
-        )
+        steps = (rotation[1:] * rotation[:-1].inv()).magnitude()
+        wide = np.flatnonzero(steps >= WIDEST)
+        if wide.size:
+            raise Refusal(
+                f"the body turns by {WIDEST:g} rad or more "
+                f"after t = {self.t[wide[0]]:g}",
+                instead="give poses between",
+            )
 
     @property
     def samples(self) -> int:
@@ -272,28 +265,19 @@ class Path(Motion):
 
     def _rotations(self) -> Rotation:
         """Return the rotations (T,) of the poses."""
-        return rotations(
-            np.stack([self.rx, self.ry, self.rz], -1)
-            if self.rx
-            else np.zeros((len(self.t), 3))
-        )
+        if not self.rx:
+            return rotations(np.zeros((len(self.t), 3)))
+        return rotations(np.stack([self.rx, self.ry, self.rz], -1))
 
     def trajectory(self, mesh: Mesh) -> Trajectory:
         """Return the motion of a mesh in time."""
-        t, place, rotation = (
-            np.array(self.t),
-            np.stack([self.x, self.y, self.z], -1),
-            self._rotations(),
-        )
+        t = np.array(self.t)
+        place = np.stack([self.x, self.y, self.z], -1)
         velocity = np.gradient(place, t, axis=0, edge_order=2)
-        return Trajectory(
-            t,
-            place,
-            rotation.as_matrix(),
-            velocity,
-            _spins(t, rotation),
-            np.zeros_like(t),
-        )
+        rotation = self._rotations()
+        spin = _spins(t, rotation)
+        angle = np.zeros_like(t)
+        return Trajectory(t, place, rotation.as_matrix(), velocity, spin, angle)
 
 
 MOTIONS = {"drag": Drag, "penetrate": Penetrate, "rotate": Rotate, "csv": Path}
@@ -301,36 +285,42 @@ MOTIONS = {"drag": Drag, "penetrate": Penetrate, "rotate": Rotate, "csv": Path}
 
 def rotations(vectors) -> Rotation:
     """Return the rotations (...,) by rotation vectors (..., 3), rad."""
-    from scipy.spatial.transform import Rotation  # loads in a fifth of a second
+    from scipy.spatial.transform import Rotation  # takes a fifth of a second to load
 
     return Rotation.from_rotvec(vectors)
 
 
 def _spins(t, rotation: Rotation) -> np.ndarray:
-    """Return the angular velocities (T, 3), rad/s in the world, of rotations at times t (T,).
+    """Return the angular velocities (T, 3), rad/s in the world, of rotations at times t
+    (T,).
 
-    At each time it is the slope of the parabola through three rotation vectors: from this rotation to itself and to its
-    neighbours."""
-    three = np.clip(np.arange(len(t)) - 1, 0, len(t) - 3)[:, None] + np.arange(3)
+    At each time it is the slope of the parabola through three rotation vectors: from
+    this rotation to itself and to its neighbours."""
+    # The numbers (T, 3) of the poses at which each parabola is known.
+    nodes = np.clip(np.arange(len(t)) - 1, 0, len(t) - 3)[:, None] + np.arange(3)
     inverse = rotation.inv()
-    vectors = np.stack([(rotation[k] * inverse).as_rotvec() for k in three.T], 1)
     spins = 0.0
     for k in range(3):
-        i, j = (three[:, m] for m in range(3) if m != k)
-        slope = (2 * t - t[i] - t[j]) / (
-            (t[three[:, k]] - t[i]) * (t[three[:, k]] - t[j])
-        )
-        spins = spins + slope[:, None] * vectors[:, k]
+        vector = (rotation[nodes[:, k]] * inverse).as_rotvec()
+        i, j = np.delete(nodes, k, axis=1).T
+        spacing = (t[nodes[:, k]] - t[i]) * (t[nodes[:, k]] - t[j])
+        slope = (2 * t - t[i] - t[j]) / spacing
+        spins = spins + slope[:, None] * vector
     return spins
 
 
 def _set_attitude(motion) -> None:
-    """Store the attitude of a motion as a rotation vector; ValueError unless it is an angle or three numbers."""
+    """Store the attitude of a motion as a rotation vector; ValueError unless it is an
+    angle or three numbers."""
     value = motion.attitude
     array = real_array("attitude", value)
-    valid = array.shape in ((), (3,)) and bool((np.abs(array) <= 10.0).all())
-    message = "attitude must be an angle about y or a rotation vector of three numbers, within 10 rad"
-    require(valid, message, value=value)
+    is_valid = array.shape in ((), (3,)) and bool((np.abs(array) <= 10.0).all())
+    require(
+        is_valid,
+        "attitude must be an angle about y or a rotation vector of three numbers, "
+        "within 10 rad",
+        value=value,
+    )
     vector = array.tolist() if array.ndim else [0.0, float(array), 0.0]
     object.__setattr__(motion, "attitude", tuple(vector))
 
@@ -341,27 +331,23 @@ def _matrix(vector) -> np.ndarray:
 
 
 def _unit_vector(heading: float, direction: float) -> np.ndarray:
-    """Return the unit vector (3,) with a heading along the ground and a direction below the horizontal, rad."""
+    """Return the unit vector (3,) with a heading along the ground and a direction below
+    the horizontal, rad."""
     level = math.cos(direction)
-    along = np.array(
-        [level * math.cos(heading), level * math.sin(heading), -math.sin(direction)]
-    )
+    x = level * math.cos(heading)
+    y = level * math.sin(heading)
+    along = np.array([x, y, -math.sin(direction)])
     along[np.abs(along) < 1e-15] = 0.0  # straight down, or level, to the last digit
     return along
 
 
 def _straight(motion, z: float, distance: float) -> Trajectory:
-    """Return a motion along a straight line of a length, m, from (0, 0, z)."""
+    """Return a motion over a distance, m, along a straight line from (0, 0, z)."""
     along = _unit_vector(motion.heading, motion.direction)
     s = np.linspace(0.0, distance, motion.samples)
     place = np.array([0.0, 0.0, z]) + s[:, None] * along
     rotation = np.broadcast_to(_matrix(motion.attitude), (len(s), 3, 3))
     velocity = np.broadcast_to(motion.speed * along, place.shape)
-    return Trajectory(
-        s / motion.speed,
-        place,
-        rotation,
-        velocity,
-        np.zeros_like(place),
-        np.zeros_like(s),
-    )
+    spin = np.zeros_like(place)
+    angle = np.zeros_like(s)
+    return Trajectory(s / motion.speed, place, rotation, velocity, spin, angle)
