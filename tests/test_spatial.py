@@ -16,7 +16,7 @@ from rft.terradynamics.meshes import (
     shapes,
     wrench,
 )
-from rft.terradynamics.meshes.mesh import below, quartered
+from rft.terradynamics.meshes.mesh import below, quartered_mesh
 from rft.terradynamics.meshes.smooth import smooth
 from rft.terradynamics.plates import VERTICAL
 
@@ -210,7 +210,7 @@ def test_force_and_moment_are_the_sum_over_faces():
     )  # alpha is then even over every face
     fine = mesh
     for _ in range(3):
-        fine = quartered(fine)
+        fine = quartered_mesh(fine)
     faces = bearing(MEDIUM, fine, rotation, place, velocity, 0 * spin)
     assert found.force == pytest.approx(faces.force.sum(0), rel=1e-12)
     moment = np.cross(faces.middle - place, faces.force).sum(0)
@@ -567,7 +567,7 @@ def test_smooth_meshes_have_the_normals_of_their_surface():
             < off
             < np.abs(ball.normals - radial).max()
         )
-    finer = quartered(mesh)
+    finer = quartered_mesh(mesh)
     np.testing.assert_allclose(
         np.linalg.norm(finer.smooth_normals, axis=-1), 1.0, atol=1e-15
     )

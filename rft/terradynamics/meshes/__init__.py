@@ -1,4 +1,5 @@
-"""Forces of grains on bodies of any form in three dimensions: the law, triangle meshes, and their motions."""
+"""Forces of grains on bodies of any form in three dimensions: the law, triangle meshes,
+and their motions."""
 
 from rft.terradynamics.meshes.files import read
 from rft.terradynamics.meshes.intrusion import Faces, Wrench, bearing, wrench
@@ -25,10 +26,31 @@ from rft.terradynamics.meshes.solids import (
 from rft.terradynamics.meshes.sound import Sound, sound
 
 __all__ = [
-    "MOTIONS", "SOLIDS", "Cylinder", "Drag", "Faces", "Leg", "Mesh", "MeshFile", "Motion", "Path", "Penetrate",
-    "Rotate", "Screw", "Solid", "Sound", "Spatial", "Sphere", "Trajectory", "Wrench", "bearing", "below", "read",
-    "sound", "wrench",
-]  # fmt: skip
+    "MOTIONS",
+    "SOLIDS",
+    "Cylinder",
+    "Drag",
+    "Faces",
+    "Leg",
+    "Mesh",
+    "MeshFile",
+    "Motion",
+    "Path",
+    "Penetrate",
+    "Rotate",
+    "Screw",
+    "Solid",
+    "Sound",
+    "Spatial",
+    "Sphere",
+    "Trajectory",
+    "Wrench",
+    "bearing",
+    "below",
+    "read",
+    "sound",
+    "wrench",
+]
 
 
 def __dir__() -> list[str]:

@@ -15,28 +15,41 @@ import numpy as np
 from rft.balance.backend import Note
 from rft.core.metres import LARGEST
 from rft.core.refusal import Refusal, formatted, located, require
-from rft.terradynamics.meshes.mesh import Mesh, require_known
+from rft.terradynamics.meshes.mesh import Mesh, require_vertices
 from rft.terradynamics.meshes.sound import OPEN_CURE, size_note, sound
 
 KINDS = ("stl", "obj", "ply")
 LARGEST_FILE = 500_000_000  # bytes
+UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+
+# Lines of an OBJ file: a face with a vertex 0, a face with a vertex below 0, a vertex,
+# and a face without spaces before it.
+ZERO = re.compile(rb"^[ \t]*f[^\n]*[ \t]0+(?=[/\s]|\Z)", re.M)
+BACK = re.compile(rb"^[ \t]*f[^\n]*[ \t]-", re.M)
+VERTEX = re.compile(rb"^[ \t]*v[ \t]", re.M)
+FACE = re.compile(rb"^f[ \t].*", re.M)
+# Lines of an STL file and of the head of a PLY file that announce triangles.
+FACET = re.compile(rb"^[ \t]*facet\b", re.M | re.I)
+POLYGONS = re.compile(rb"^element[ \t]+face[ \t]+(\d{1,18})", re.M)
 
 
 def read(path, closed: bool = True, scale: float = 1.0) -> Mesh:
-    """Return the mesh of an STL, OBJ or PLY file, with lengths times ``scale``, 0.001 for millimetres. Needs trimesh.
+    """Return the mesh of an STL, OBJ or PLY file, with lengths times ``scale``, 0.001
+    for millimetres. Needs trimesh.
 
-    It is mended as by `sound`, which is told in a `Note`, a warning, of one line.
+    closed: False for a sheet. The mesh is mended by `sound`; a warning of one line, a
+    `Note`, says what was mended.
     """
     kind = str(path).rpartition(".")[2].lower()
     require(kind in KINDS, "a mesh is an .stl, .obj or .ply file", where=path)
-    vertices, faces = _loaded(Path(path), kind)
+    vertices, faces = _load(Path(path), kind)
     require(
         faces.ndim == 2 and len(faces) > 0,
         f"{path} is no {kind.upper()} mesh",
         because="it has no triangles",
     )
     with located(path):
-        require_known(faces, len(vertices))
+        require_vertices(faces, len(vertices))
         require(bool(np.isfinite(vertices).all()), "vertices must be finite")
         size = scale * float(np.ptp(vertices[faces], axis=(0, 1)).max())
         require(
@@ -51,38 +64,32 @@ def read(path, closed: bool = True, scale: float = 1.0) -> Mesh:
     return mesh
 
 
-# Lines of an OBJ file: a face with a vertex 0, a face with a vertex below 0, and a vertex.
-ZERO, BACK, VERTEX = (
-    re.compile(rb"^[ \t]*" + line, re.M)
-    for line in (rb"f[^\n]*[ \t]0+(?=[/\s]|\Z)", rb"f[^\n]*[ \t]-", rb"v[ \t]")
-)
+def _require_readable(data: bytes) -> None:
+    """Raise ValueError for an OBJ file that trimesh misreads.
 
-
-def _require_read_rightly(data: bytes) -> None:
-    """Raise ValueError for an OBJ file that trimesh misreads: it takes vertex 0 for the last one, and counts vertices below 0
-    back from the end of the file, where OBJ counts back from the face."""
+    It takes vertex 0 for the last one, and counts vertices below 0 back from the end of
+    the file, where OBJ counts back from the face."""
     require(
         not ZERO.search(data),
         "a face names vertex 0, where vertices count from 1",
         instead="mend the mesh",
     )
     back = BACK.search(data)
-    valid = back is None or not VERTEX.search(data, back.end())
     require(
-        valid,
+        back is None or not VERTEX.search(data, back.end()),
         "a face counts vertices back, and vertices follow it",
         instead="count from 1, or put all vertices first",
     )
 
 
-def _loaded(path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
+def _load(path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
     """Return (vertices, faces) of an ordinary file of at most `LARGEST_FILE` bytes."""
     try:
         size = path.stat().st_size
         require(path.is_file(), f"{path} is no ordinary file")
         require(
             size <= LARGEST_FILE,
-            f"{path} is larger than {LARGEST_FILE / 1000000.0:.0f} MB",
+            f"{path} is larger than {LARGEST_FILE / 1e6:.0f} MB",
             instead="give fewer triangles",
         )
         data = path.read_bytes()
@@ -91,10 +98,10 @@ def _loaded(path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
     with located(path):
         data = _plain(kind, data)
         if kind == "obj":
-            _require_read_rightly(data)
-    with _silent():
-        vertices, faces = _parsed(path, kind, data)
-    least, most = _count(kind, data)
+            _require_readable(data)
+    with _silenced_trimesh():
+        vertices, faces = _parse(path, kind, data)
+    least, most = _announced_triangles(kind, data)
     require(
         least <= len(faces) <= most or not len(faces),
         f"{path} is no {kind.upper()} mesh",
@@ -105,8 +112,10 @@ def _loaded(path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _plain(kind: str, data: bytes) -> bytes:
-    """Return a file as trimesh reads it rightly: texts in UTF-8 with line feeds, without names and comments; Refusal
-    for a binary STL file that is cut off."""
+    """Return a file in the form that trimesh reads correctly: binary files as they are,
+    texts in UTF-8 with line feeds, without names and comments.
+
+    Refusal for a binary STL file that is cut off."""
     is_text = kind == "obj" or b"\0" not in data or data[:2] in UTF_16
     if kind == "stl" and (not is_text or _has_records(data)):
         records = int.from_bytes(data[80:84], "little")
@@ -117,10 +126,13 @@ def _plain(kind: str, data: bytes) -> bytes:
             instead="write it anew in the program that made it",
         )
         return data
-    if not is_text or (kind == "ply" and b"format binary" in data[:200]):
+    is_binary_ply = kind == "ply" and b"format binary" in data[:200]
+    if not is_text or is_binary_ply:
         return data
+
+    encoding = "utf-16" if data[:2] in UTF_16 else "utf-8-sig"
     try:
-        text = data.decode("utf-16" if data[:2] in UTF_16 else "utf-8-sig")
+        text = data.decode(encoding)
     except UnicodeDecodeError:
         text = data.decode("latin-1")
     text = text.replace("\r\n", "\n").replace("\r", "\n")
@@ -133,15 +145,13 @@ def _plain(kind: str, data: bytes) -> bytes:
     return text.encode()
 
 
-UTF_16 = (b"\xff\xfe", b"\xfe\xff")
-
-
 def _has_records(data: bytes) -> bool:
-    """Return whether a file is as long as a binary STL file of as many triangles as it announces."""
+    """Return whether a file is as long as a binary STL file is with the number of
+    triangles that it announces."""
     return len(data) == 84 + 50 * int.from_bytes(data[80:84], "little") > 84
 
 
-def _parsed(path: Path, kind: str, data: bytes) -> tuple[np.ndarray, np.ndarray]:
+def _parse(path: Path, kind: str, data: bytes) -> tuple[np.ndarray, np.ndarray]:
     """Return (vertices, faces) as trimesh reads them."""
     try:
         import trimesh
@@ -157,9 +167,8 @@ def _parsed(path: Path, kind: str, data: bytes) -> tuple[np.ndarray, np.ndarray]
         )
         faces = np.asarray(getattr(mesh, "faces", ()))
         return np.asarray(mesh.vertices, float), faces
-    except (
-        Exception
-    ) as error:  # trimesh raises many kinds of errors for a file that is no mesh
+    except Exception as error:
+        # trimesh raises many kinds of errors for a file that is no mesh.
         reason = formatted(str(error))
         if "could not be read" in str(error):
             reason = "a number in it cannot be read"
@@ -167,20 +176,17 @@ def _parsed(path: Path, kind: str, data: bytes) -> tuple[np.ndarray, np.ndarray]
 
 
 @contextlib.contextmanager
-def _silent() -> Iterator[None]:
-    """Keep trimesh from printing tracebacks, log records and warnings of its own. A text of which NumPy reads a part
-    is an error, where NumPy only warns."""
+def _silenced_trimesh() -> Iterator[None]:
+    """Keep trimesh from printing tracebacks, log records and warnings. A text of which
+    NumPy can read only a part is an error, where NumPy would only warn."""
     with warnings.catch_warnings(), contextlib.redirect_stderr(io.StringIO()):
         warnings.simplefilter("ignore")
         warnings.filterwarnings("error", "string or file could not be read")
         with contextlib.suppress(ImportError):  # refused later
             import trimesh  # noqa: F401  (its loggers exist from here on)
-        names = logging.root.manager.loggerDict
-        loggers = [
-            logging.getLogger(name)
-            for name in [*names]
-            if name.split(".")[0] == "trimesh"
-        ]
+        names = [*logging.root.manager.loggerDict]
+        names = [name for name in names if name.split(".")[0] == "trimesh"]
+        loggers = [logging.getLogger(name) for name in names]
         before = [logger.disabled for logger in loggers]
         for logger in loggers:
             logger.disabled = True
@@ -191,19 +197,18 @@ def _silent() -> Iterator[None]:
                 logger.disabled = disabled
 
 
-def _count(kind: str, data: bytes) -> tuple[float, float]:
-    """Return the least and the largest number of triangles that a file of `_plain` text announces."""
+def _announced_triangles(kind: str, data: bytes) -> tuple[float, float]:
+    """Return the least and the largest number of triangles that a file of `_plain` text
+    announces."""
     if kind == "stl":
+        if _has_records(data):
+            return 0, np.inf
         count = len(FACET.findall(data))
-        return (0, np.inf) if _has_records(data) else (count, count)
+        return count, count
     if kind == "obj":
         corners = [len(line.split()) - 1 for line in FACE.findall(data)]
         count = sum(max(0, n - 2) for n in corners)
         return count, count
-    count = sum(map(int, POLYGONS.findall(data[: data.find(b"end_header")])))
+    head = data[: data.find(b"end_header")]
+    count = sum(map(int, POLYGONS.findall(head)))
     return count, np.inf
-
-
-FACET = re.compile(rb"^[ \t]*facet\b", re.M | re.I)
-FACE = re.compile(rb"^f[ \t].*", re.M)
-POLYGONS = re.compile(rb"^element[ \t]+face[ \t]+(\d{1,18})", re.M)

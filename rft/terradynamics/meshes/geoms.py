@@ -19,14 +19,12 @@ from rft.terradynamics.meshes.sound import size_note, sound
 
 MOST_FACES = 200_000  # of a geom's mesh, as in an STL file that MuJoCo takes
 MOST_ELEMENTS = 100_000  # of a geom
-ALONG_Z = np.array(
-    [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]
-)  # rows of vectors times this: from y to z
 ICOSAHEDRON = 1.0515  # edge of an icosahedron over its radius
 FEWEST_AROUND = 8  # edges around round geoms of a given length of edges
 # Edges of boxes and of meshes along half of the diagonal, by default; with fewer, a
 # face that only just leads in part bears up to a tenth too much or too little.
-PER_REACH, PER_REACH_OF_MESH = 5, 6
+PER_REACH = 5
+PER_REACH_OF_MESH = 6
 MOST_PIECES = 12  # of a slender round geom, by default
 
 
@@ -39,57 +37,72 @@ def mesh_of_elements(
 ) -> Mesh:
     """Return the mesh of a geom in its own frame.
 
-    share: of the lengths of edges that the shape asks for, where ``length`` is None, in
-    all directions. length: m, of the edges, about; None for as many triangles as the
-    shape of the geom asks for, with which 90 % of random motions have an error of the
-    force below 3 %, and none one above 6 %. Of a mesh geom, triangles that are larger
-    are halved, and those that are smaller are merged
-    (`rft.terradynamics.meshes.merged`). hulls: whether a mesh without an inside stands
-    for its convex hull."""
-    kind, size = geom_kind(model, geom), np.array(model.geom_size[geom])
+    length: m, of the edges, about; None for as many triangles as the shape of the geom
+    needs, with which 90 % of random motions have an error of the force below 3 %, and
+    none has one above 6 %. Of a mesh geom, triangles that are larger are halved, and
+    those that are smaller are merged (`rft.terradynamics.meshes.merged`). share: factor
+    of the lengths of edges where ``length`` is None. hulls: whether the convex hull
+    stands for a mesh without an inside."""
+    kind = geom_kind(model, geom)
+    size = np.array(model.geom_size[geom])
     if kind == "box":
-        cuts = _pieces(2 * size, length or np.linalg.norm(size) / PER_REACH)
-        cuts = cuts if length else _shared(np.maximum(cuts, 2), share)
-        _require_few(4 * int(np.dot(cuts, np.roll(cuts, 1))))
-        return shapes.box(2 * size, list(map(int, cuts)))
+        return _box(size, length, share)
     if kind == "capsule":
-        quarter, along = _shared(_cuts_of_capsule(size[0], size[1], length), share)
-        _require_few(8 * quarter * (quarter + along))
+        cuts = _cuts_of_capsule(size[0], size[1], length)
+        quarter, along = _scaled_cuts(cuts, share)
+        _require_allowed(8 * quarter * (quarter + along))
         return widened.capsule(size[0], size[1], quarter, along)
     if kind == "cylinder":
         cuts = _cuts_of_cylinder(size[0], size[1], length)
-        around, along, across = _shared(cuts, share)
-        _require_few(2 * around * (along + 2 * across))
+        around, along, across = _scaled_cuts(cuts, share)
+        _require_allowed(2 * around * (along + 2 * across))
         return widened.cylinder(size[0], size[1], around, along, across)
     if kind == "mesh":
         mesh = smooth(_solid_mesh(model, int(model.geom_dataid[geom]), hulls))
         reach = np.linalg.norm(np.ptp(mesh.vertices, axis=0)) / 2
         length = length or share * reach / PER_REACH_OF_MESH
         return resized(mesh, length, MOST_ELEMENTS)
+
     radii = size if kind == "ellipsoid" else size[[0, 0, 0]]
     fineness = max(1, 2 + round(-math.log2(share)))
     if length:
         fineness = max(1, round(math.log2(ICOSAHEDRON * radii.max() / length)))
-    _require_few(20 * 4**fineness)
+    _require_allowed(20 * 4**fineness)
     return widened.ellipsoid(radii, fineness)
 
 
+def _box(half: np.ndarray, length: float | None, share: float) -> Mesh:
+    """Return the mesh of a box with half its sides, m; for the rest see
+    `mesh_of_elements`."""
+    if length:
+        cuts = _pieces(2 * half, length)
+    else:
+        cuts = _pieces(2 * half, np.linalg.norm(half) / PER_REACH)
+        cuts = _scaled_cuts(np.maximum(cuts, 2), share)
+    _require_allowed(4 * int(np.dot(cuts, np.roll(cuts, 1))))
+    return shapes.box(2 * half, list(map(int, cuts)))
+
+
 def _pieces(sides, length: float, fewest: int = 1) -> np.ndarray:
-    """Return the numbers of pieces of a length, m, at most, that sides, m, are cut
-    into."""
+    """Return the numbers of pieces of at most a length, m, into which sides, m, are
+    cut."""
     counts = np.ceil(np.atleast_1d(sides) / length - 1e-9)
     return np.clip(counts, fewest, 4096).astype(int)
 
 
-def _shared(cuts, share: float) -> list[int]:
-    """Return numbers of pieces of a share of the length of those in ``cuts``; even ones
-    stay even, for symmetry."""
-    units = [2 - int(n) % 2 for n in cuts]
-    return [unit * max(1, round(n / unit / share)) for n, unit in zip(cuts, units)]
+def _scaled_cuts(cuts, share: float) -> list[int]:
+    """Return numbers of pieces whose length is a share of that of the pieces in
+    ``cuts``; even numbers stay even, for symmetry."""
+    scaled = []
+    for count in cuts:
+        unit = 2 - int(count) % 2
+        scaled.append(unit * max(1, round(count / unit / share)))
+    return scaled
 
 
 def _cuts_of_capsule(radius: float, half: float, length: float | None):
-    """Return the edges along a quarter of the rim, and the pieces of the rod."""
+    """Return the number of edges along a quarter of the rim, and of pieces of the rod.
+    half: half of its length, m."""
     if length:
         (quarter,) = _pieces(np.pi / 2 * radius, length, FEWEST_AROUND // 4)
         (along,) = _pieces(2 * half, length)
@@ -102,8 +115,8 @@ def _cuts_of_capsule(radius: float, half: float, length: float | None):
 
 
 def _cuts_of_cylinder(radius: float, half: float, length: float | None):
-    """Return the edges around, the pieces along, and those from the rim to the middle
-    of an end."""
+    """Return the numbers of edges around, of pieces along, and of pieces from the rim
+    to the middle of an end."""
     if length:
         (around,) = _pieces(2 * np.pi * radius, length, FEWEST_AROUND)
         (along,) = _pieces(2 * half, length)
@@ -111,16 +124,20 @@ def _cuts_of_cylinder(radius: float, half: float, length: float | None):
         return around, along, across
     if half < 0.3 * radius:
         return 16, 2, 3
-    around = 24 if half < 4 * radius else 16
-    across = 2 if half < 4 * radius else 1
+    is_short = half < 4 * radius
+    around = 24 if is_short else 16
+    across = 2 if is_short else 1
     along = math.ceil(half / radius - 1e-9)
     return around, int(np.clip(along, 4, MOST_PIECES)), across
 
 
-def _require_few(count: int) -> None:
+def _require_allowed(count: int) -> None:
     """Raise Refusal for more elements than a geom may have."""
-    what = f"the geom has {count} elements, more than {MOST_ELEMENTS}"
-    require(count <= MOST_ELEMENTS, what, instead="make ``element`` longer")
+    require(
+        count <= MOST_ELEMENTS,
+        f"the geom has {count} elements, more than {MOST_ELEMENTS}",
+        instead="make ``element`` longer",
+    )
 
 
 def geom_kind(model: mujoco.MjModel, geom: int) -> str:
@@ -134,16 +151,15 @@ def geom_name(model: mujoco.MjModel, geom: int) -> str:
 
 
 def described(model: mujoco.MjModel, geom: int) -> str:
-    """Return what tells a geom from others: its name, or its number with its body and
-    group."""
+    """Return a text that tells a geom from others: its name, or its number with its
+    body and group."""
     name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, geom)
     if name:
         return formatted(name)
-    body = mujoco.mj_id2name(
-        model, mujoco.mjtObj.mjOBJ_BODY, int(model.geom_bodyid[geom])
-    )
-    owner = f"the body {formatted(body)}" if body else "a body without name"
-    return f"{geom}, of {owner} in group {model.geom_group[geom]}"
+    owner = int(model.geom_bodyid[geom])
+    body = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, owner)
+    body = f"the body {formatted(body)}" if body else "a body without name"
+    return f"{geom}, of {body} in group {model.geom_group[geom]}"
 
 
 def is_movable(model: mujoco.MjModel, geom: int) -> bool:
@@ -154,19 +170,19 @@ def is_movable(model: mujoco.MjModel, geom: int) -> bool:
     return bool(body)
 
 
+def _mesh_vertices(model: mujoco.MjModel, k: int) -> np.ndarray:
+    """Return the vertices (V, 3), m, of mesh number k of a model."""
+    first = model.mesh_vertadr[k]
+    return np.array(model.mesh_vert[first : first + model.mesh_vertnum[k]], float)
+
+
 def _model_mesh(model: mujoco.MjModel, k: int) -> Mesh:
     """Return mesh number k of a model, mended as by `sound`."""
-    first, start, faces = (
-        model.mesh_vertadr[k],
-        model.mesh_faceadr[k],
-        model.mesh_facenum[k],
-    )
-    vertices = np.array(model.mesh_vert[first : first + model.mesh_vertnum[k]], float)
+    start = model.mesh_faceadr[k]
+    faces = model.mesh_face[start : start + model.mesh_facenum[k]]
     name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_MESH, k) or k
     with located(f"mesh {formatted(name)}"):
-        mesh, notes = sound(
-            vertices, model.mesh_face[start : start + faces], cure="close it"
-        )
+        mesh, notes = sound(_mesh_vertices(model, k), faces, cure="close it")
     notes = [*notes, *size_note(mesh, "is the scale of its asset right?")]
     if notes:
         warnings.warn(f"mesh {formatted(name)}: {'; '.join(notes)}", Note, stacklevel=2)
@@ -196,10 +212,9 @@ def _solid_mesh(model: mujoco.MjModel, k: int, hulls: bool) -> Mesh:
 
 
 def _hull(model: mujoco.MjModel, k: int) -> Mesh:
-    """Return the convex hull of mesh number k of a model, as MuJoCo's contacts take
-    it."""
-    first = model.mesh_vertadr[k]
-    points = np.array(model.mesh_vert[first : first + model.mesh_vertnum[k]], float)
+    """Return the convex hull of mesh number k of a model, with which MuJoCo's contacts
+    compute."""
+    points = _mesh_vertices(model, k)
     try:
         hull = ConvexHull(points)
     except QhullError:
@@ -208,5 +223,5 @@ def _hull(model: mujoco.MjModel, k: int) -> Mesh:
     a, b, c = points[triangles].swapaxes(0, 1)
     inwards = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(1) < 0.0
     triangles = np.where(inwards[:, None], triangles[:, ::-1], triangles)
-    known, index = np.unique(triangles, return_inverse=True)
-    return Mesh(points[known], index.reshape(triangles.shape))
+    used, index = np.unique(triangles, return_inverse=True)
+    return Mesh(points[used], index.reshape(triangles.shape))

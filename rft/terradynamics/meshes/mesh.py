@@ -1,4 +1,5 @@
-"""Triangle meshes: their geometry, the parts of triangles below the surface, and copies."""
+"""Triangle meshes: their geometry, the parts of triangles below the surface, and meshes
+that follow from others."""
 
 from __future__ import annotations
 
@@ -11,25 +12,31 @@ from rft.core.checks import real_array
 from rft.core.refusal import Refusal, require
 from rft.terradynamics.meshes import shells
 
-MOST_TRIANGLES = 2_000_000  # triangles
-FLAT = 1e-14  # of the square of the size: area of a triangle that counts as none
+MOST_TRIANGLES = 2_000_000
+# Area over the square of the mesh's size, up to which a triangle counts as flat.
+FLAT = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """A surface of triangles, in its own frame.
 
-    vertices: (V, 3), m. faces: (F, 3), indices of vertices, counter-clockwise as seen from outside. closed: whether triangles
-    must run along every edge as often one way as the other, in shells of which none lies inside another; False for a thin
-    plate, of which either side may lead. smooth_normals: (F, 3, 3), unit normals at the corners of the triangles of a mesh
-    that stands for a smooth surface; None for the normals of the triangles.
+    vertices: (V, 3), m. faces: (F, 3), indices of vertices, counter-clockwise as seen
+    from outside. smooth_normals: (F, 3, 3), unit normals at the corners of the
+    triangles of a mesh that stands for a smooth surface; None for the normals of the
+    triangles.
+
+    closed: True for bodies, whose triangles run along every edge as often one way as
+    the other, in shells of which none lies inside another; ValueError for others. False
+    for thin plates, of which either side may lead.
 
     Examples
     --------
     >>> import numpy as np
     >>> from rft.terradynamics.meshes import Mesh
     >>> vertices = 0.01 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    >>> tetrahedron = Mesh(vertices, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+    >>> faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    >>> tetrahedron = Mesh(vertices, faces)
     >>> tetrahedron.faces.shape
     (4, 3)
     """
@@ -40,15 +47,16 @@ class Mesh:
     smooth_normals: np.ndarray | None = None
 
     def __post_init__(self):
-        vertices, faces = real_array("vertices", self.vertices), np.asarray(self.faces)
+        vertices = real_array("vertices", self.vertices)
         require(
             vertices.ndim == 2 and vertices.shape[1:] == (3,),
             "vertices must be (V, 3)",
             value=vertices.shape,
         )
-        valid = faces.ndim == 2 and faces.shape[1:] == (3,) and faces.dtype.kind in "iu"
+        faces = np.asarray(self.faces)
+        are_triangles = faces.ndim == 2 and faces.shape[1:] == (3,)
         require(
-            valid,
+            are_triangles and faces.dtype.kind in "iu",
             f"faces must be (F, 3) whole numbers, got {faces.dtype} {faces.shape}",
         )
         require(
@@ -56,26 +64,24 @@ class Mesh:
             f"a mesh has 1 to {MOST_TRIANGLES:,} triangles, got {len(faces):,}",
         )
         require(bool(np.isfinite(vertices).all()), "vertices must be finite")
-        require_known(faces, len(vertices))
+        require_vertices(faces, len(vertices))
         require(
             isinstance(self.closed, bool),
             "closed must be true or false",
             value=self.closed,
         )
-        normals = (
-            None
-            if self.smooth_normals is None
-            else real_array("smooth_normals", self.smooth_normals)
-        )
-        valid = normals is None or (
-            normals.shape == (len(faces), 3, 3) and bool(np.isfinite(normals).all())
-        )
-        require(
-            valid, f"smooth_normals must be unit normals of shape ({len(faces)}, 3, 3)"
-        )
+        normals = self.smooth_normals
+        if normals is not None:
+            normals = real_array("smooth_normals", normals)
+            require(
+                normals.shape == (len(faces), 3, 3)
+                and bool(np.isfinite(normals).all()),
+                f"smooth_normals must be unit normals of shape ({len(faces)}, 3, 3)",
+            )
         object.__setattr__(self, "smooth_normals", normals)
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "faces", faces.astype(np.int64))
+
         flat = int((self.areas <= FLAT * np.ptp(vertices, axis=0).max() ** 2).sum())
         require(
             not flat,
@@ -86,11 +92,13 @@ class Mesh:
             self._require_closed()
 
     def _require_closed(self) -> None:
-        """Raise ValueError unless grains touch all triangles, and these agree on which
-        side is out."""
+        """Raise ValueError unless the mesh encloses a body, grains touch all triangles,
+        and these agree on which side is out."""
         faces = self.faces
-        if len(surplus := shells.excess(faces)):
-            raise self._open(surplus)
+        surplus = shells.excess_edges(faces)
+        if len(surplus):
+            raise self._open_refusal(surplus)
+
         parts = [faces[part] for part in shells.shells(faces)]
         n_outside = [len(shells.without_walls(self.vertices, part)) for part in parts]
         is_hidden = shells.is_enclosed(self.vertices, parts)
@@ -107,8 +115,9 @@ class Mesh:
             instead="turn the triangles round",
         )
 
-    def _open(self, surplus: np.ndarray) -> Refusal:
-        """Return the refusal of a mesh with edges that are run more often one way."""
+    def _open_refusal(self, surplus: np.ndarray) -> Refusal:
+        """Return the refusal of a mesh with edges (E, 2) along which more triangles run
+        this way than the other."""
         _, uses = np.unique(surplus, axis=0, return_counts=True)
         if (uses > 1).any() or self._has_doubles():
             return Refusal(
@@ -129,9 +138,11 @@ class Mesh:
         """Return whether a triangle stands twice."""
         return len(np.unique(np.sort(self.faces, 1), axis=0)) < len(self.faces)
 
-    def _copy(self, vertices: np.ndarray, faces: np.ndarray, normals) -> Mesh:
-        """Return a mesh that is as sound as this one, unchecked: its checks take longer
-        than its making."""
+    def unchecked_copy(self, vertices: np.ndarray, faces: np.ndarray, normals) -> Mesh:
+        """Return a mesh of these vertices, faces and smooth normals that is as sound as
+        this one.
+
+        It is not checked, because checks take longer than all the rest."""
         mesh = object.__new__(Mesh)
         values = {
             "vertices": vertices,
@@ -161,7 +172,8 @@ class Mesh:
 
     @cached_property
     def middle_normals(self) -> np.ndarray:
-        """Unit normals (F, 3) at the triangles' middles of the surface that the mesh stands for."""
+        """Unit normals (F, 3) at the triangles' middles of the surface that the mesh
+        stands for."""
         if self.smooth_normals is None:
             return self.normals
         mean = self.smooth_normals.sum(1)
@@ -181,9 +193,9 @@ class Mesh:
     def second_moments(self) -> np.ndarray:
         """Integrals (F, 3, 3) of x x^T over the triangles, m^4."""
         corners = self.vertices[self.faces]
-        sums = np.einsum("fci,fcj->fij", corners, corners) + 9 * np.einsum(
-            "fi,fj->fij", self.middles, self.middles
-        )
+        squares = np.einsum("fci,fcj->fij", corners, corners)
+        squares_of_middles = np.einsum("fi,fj->fij", self.middles, self.middles)
+        sums = squares + 9 * squares_of_middles
         return sums * (self.areas / 12)[:, None, None]
 
     @property
@@ -194,13 +206,12 @@ class Mesh:
 
     @property
     def two_sided(self) -> Mesh:
-        """An open mesh with a second triangle on the back of each, so that the side which leads bears. Shells that
-        close stay; ValueError if one nearly closes."""
-        sheets = [
-            part
-            for part in shells.shells(self.faces)
-            if len(shells.excess(self.faces[part]))
-        ]
+        """An open mesh with a second triangle on the back of each, so that the side
+        which leads bears.
+
+        Shells that close stay as they are; ValueError if one nearly closes."""
+        parts = shells.shells(self.faces)
+        sheets = [part for part in parts if len(shells.excess_edges(self.faces[part]))]
         for part in sheets:
             require(
                 not shells.nearly_closes(self.vertices, self.faces[part]),
@@ -213,12 +224,15 @@ class Mesh:
         if normals is not None:
             normals = np.concatenate([normals, -normals[back][:, ::-1]])
         faces = np.concatenate([self.faces, self.faces[back][:, ::-1]])
-        return self._copy(self.vertices, faces, normals)
+        return self.unchecked_copy(self.vertices, faces, normals)
 
 
 def below(corners: np.ndarray, heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the parts of triangles (T, 3, 3) below the surface, from the corners' heights (T, 3): triangles (P, 3, 3), and
-    the index (P,) of the triangle that each is a part of. A triangle that crosses the surface has one part or two.
+    """Return the parts of triangles (T, 3, 3) below the surface, from the heights
+    (T, 3) of their corners.
+
+    Returns triangles (P, 3, 3), and the index (P,) of the triangle that each is a part
+    of. A triangle that crosses the surface has one part or two.
 
     Examples
     --------
@@ -231,31 +245,30 @@ def below(corners: np.ndarray, heights: np.ndarray) -> tuple[np.ndarray, np.ndar
     """
     under = heights < 0
     count = under.sum(-1)
-    full, tips, pairs = (np.flatnonzero(count == k) for k in (3, 1, 2))
-    # The vertex that is alone on its side comes first; the sense of the triangle stays.
-    (a, p, q), (lone, b, c) = (
-        _starting_at(
-            corners[index], heights[index], np.argmax(under[index] == alone, -1)
-        )
-        for index, alone in ((tips, True), (pairs, False))
-    )
-    small = np.stack([a[0], _crossing(a, p), _crossing(a, q)], 1)
-    p, q = _crossing(b, lone), _crossing(c, lone)
-    return (
-        np.concatenate(
-            [
-                corners[full],
-                small,
-                np.stack([p, b[0], c[0]], 1),
-                np.stack([p, c[0], q], 1),
-            ]
-        ),
-        np.concatenate([full, tips, pairs, pairs]),
-    )
+    full = np.flatnonzero(count == 3)
+
+    # With one corner under the surface, the part is a triangle at that corner a.
+    tips = np.flatnonzero(count == 1)
+    first = np.argmax(under[tips], -1)
+    a, p, q = _corners_from(first, corners[tips], heights[tips])
+    at_corner = np.stack([a[0], _crossing(a, p), _crossing(a, q)], 1)
+
+    # With one corner over it, the part is the quadrilateral between the other two, b
+    # and c, and the points p and q where edges cross the surface.
+    quadrilaterals = np.flatnonzero(count == 2)
+    first = np.argmin(under[quadrilaterals], -1)
+    over, b, c = _corners_from(first, corners[quadrilaterals], heights[quadrilaterals])
+    p = _crossing(b, over)
+    q = _crossing(c, over)
+    halves = [np.stack([p, b[0], c[0]], 1), np.stack([p, c[0], q], 1)]
+
+    parts = np.concatenate([corners[full], at_corner, *halves])
+    return parts, np.concatenate([full, tips, quadrilaterals, quadrilaterals])
 
 
-def _starting_at(corners: np.ndarray, heights: np.ndarray, first: np.ndarray) -> list:
-    """Return (point (T, 3), height (T,)) of the three corners in cyclic order, starting at the corner ``first`` (T,)."""
+def _corners_from(first: np.ndarray, corners: np.ndarray, heights: np.ndarray) -> list:
+    """Return (point (T, 3), height (T,)) of the three corners of triangles in cyclic
+    order, from the corner ``first`` (T,) on."""
     order = (first[:, None] + np.arange(3)) % 3
     corners = np.take_along_axis(corners, order[..., None], 1)
     heights = np.take_along_axis(heights, order, 1)
@@ -263,56 +276,58 @@ def _starting_at(corners: np.ndarray, heights: np.ndarray, first: np.ndarray) ->
 
 
 def _crossing(under: tuple, over: tuple) -> np.ndarray:
-    """Return the points (T, 3) where edges from corners under the surface to corners on or over it cross it."""
+    """Return the points (T, 3) where edges from corners under the surface to corners on
+    or over it cross it; corners are (point, height)."""
     share = under[1] / (under[1] - over[1])
     return under[0] + share[:, None] * (over[0] - under[0])
 
 
-def subdivided(
+def cut_in_four(
     vertices: np.ndarray, faces: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return vertices and faces of a mesh with every triangle cut in four flat ones at the middles of its edges."""
-    pairs = np.sort(np.stack([faces, faces[:, [1, 2, 0]]], -1).reshape(-1, 2), -1)
-    edges, index = np.unique(pairs, axis=0, return_inverse=True)
-    ab, bc, ca = len(vertices) + index.reshape(-1, 3).T
+    """Return vertices and faces of a mesh with every triangle cut in four flat ones at
+    the middles of its edges."""
+    edges = np.stack([faces, faces[:, [1, 2, 0]]], -1).reshape(-1, 2)
+    edges, index = np.unique(np.sort(edges, -1), axis=0, return_inverse=True)
     a, b, c = faces.T
-    cut = np.concatenate(
-        [np.stack(t, -1) for t in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))]
-    )
-    return np.concatenate([vertices, vertices[edges].mean(1)]), cut
+    ab, bc, ca = len(vertices) + index.reshape(-1, 3).T
+    vertices = np.concatenate([vertices, vertices[edges].mean(1)])
+    return vertices, _four_triangles(a, b, c, ab, bc, ca)
 
 
-def quartered(mesh: Mesh) -> Mesh:
+def quartered_mesh(mesh: Mesh) -> Mesh:
     """Return the same surface with four times as many triangles."""
     normals = mesh.smooth_normals
     if normals is not None:
         a, b, c = normals.swapaxes(0, 1)
-        ab, bc, ca = (
-            x / np.linalg.norm(x, axis=-1, keepdims=True) for x in (a + b, b + c, c + a)
-        )
-        normals = np.concatenate(
-            [
-                np.stack(t, 1)
-                for t in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))
-            ]
-        )
-    return mesh._copy(*subdivided(mesh.vertices, mesh.faces), normals)
+        middles = [a + b, b + c, c + a]
+        middles = [x / np.linalg.norm(x, axis=-1, keepdims=True) for x in middles]
+        normals = _four_triangles(a, b, c, *middles)
+    vertices, faces = cut_in_four(mesh.vertices, mesh.faces)
+    return mesh.unchecked_copy(vertices, faces, normals)
 
 
-def mirrored(mesh: Mesh) -> Mesh:
+def _four_triangles(a, b, c, ab, bc, ca) -> np.ndarray:
+    """Return the values (4 F, 3, ...) at the corners of the four parts of triangles,
+    from those at their corners and at the middles of their edges (F, ...)."""
+    parts = [(a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)]
+    return np.concatenate([np.stack(part, 1) for part in parts])
+
+
+def mirror_image(mesh: Mesh) -> Mesh:
     """Return the mirror image of a mesh in the plane of x and z."""
-    normals = (
-        None
-        if mesh.smooth_normals is None
-        else mesh.smooth_normals[:, ::-1] * [1.0, -1.0, 1.0]
-    )
-    return mesh._copy(mesh.vertices * [1.0, -1.0, 1.0], mesh.faces[:, ::-1], normals)
+    mirror = [1.0, -1.0, 1.0]
+    normals = mesh.smooth_normals
+    if normals is not None:
+        normals = normals[:, ::-1] * mirror
+    return mesh.unchecked_copy(mesh.vertices * mirror, mesh.faces[:, ::-1], normals)
 
 
-def require_known(faces: np.ndarray, count: int) -> None:
+def require_vertices(faces: np.ndarray, count: int) -> None:
     """Raise ValueError if faces name vertices other than 0 to count - 1."""
-    for bad in faces[(faces < 0) | (faces >= count)][:1]:
+    unknown = faces[(faces < 0) | (faces >= count)]
+    if len(unknown):
         raise Refusal(
-            f"a face names vertex {bad}, where vertices are 0 to {count - 1}",
+            f"a face names vertex {unknown[0]}, where vertices are 0 to {count - 1}",
             instead="mend the mesh",
         )

@@ -9,7 +9,7 @@ import numpy as np
 
 from rft.core.checks import in_range
 from rft.core.refusal import require
-from rft.terradynamics.meshes.mesh import Mesh, subdivided
+from rft.terradynamics.meshes.mesh import Mesh, cut_in_four
 
 
 def sphere(radius: float, fineness: int = 4) -> Mesh:
@@ -48,7 +48,7 @@ def _quartered(
     """Return vertices and faces of a mesh with all corners on a sphere about the
     origin, with every triangle cut in four at the middles of its edges."""
     size = np.linalg.norm(vertices[0])
-    vertices, faces = subdivided(vertices, faces)
+    vertices, faces = cut_in_four(vertices, faces)
     return vertices * (size / np.linalg.norm(vertices, axis=-1, keepdims=True)), faces
 
 

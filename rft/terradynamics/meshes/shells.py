@@ -1,7 +1,8 @@
-"""Shells of a mesh: its connected surfaces, which of them close, and which lie inside others.
+"""Shells of a mesh: its connected surfaces, which of them close, and which lie inside
+others.
 
-An edge is sound if triangles run along it as often one way as the other. Two bodies may
-so share an edge, with four triangles.
+An edge is sound if as many triangles run along it one way as the other. Two bodies may
+therefore share an edge, at which four triangles meet.
 """
 
 from __future__ import annotations
@@ -12,13 +13,17 @@ import numpy as np
 
 from rft.core.refusal import Refusal, require
 
-NEARLY = 0.1  # of its surface: area of the caps of a mesh that nearly closes; assumed
+# Area of the caps that close a mesh, over the area of the mesh, up to which it nearly
+# closes; assumed.
+NEARLY = 0.1
+LONGEST_LOOP = 60  # edges of a hole that gets its least surface; the cost is cubic
 MOST_SHELLS = 3000
 CLEARANCE = 1e-6  # of the size: shells that are closer touch
 PAIRS_AT_ONCE = 4_000_000  # pairs of boxes, for memory
 FINEST_GRID = 256  # cells along a side
-# A turn about an oblique axis: no ray then meets edges of meshes that lie along axes.
-GENERIC_TURN = np.array([
+# A rotation about an oblique axis, after which no ray along an axis meets edges of
+# meshes that lay along axes.
+OBLIQUE_ROTATION = np.array([
     [0.4541523277849393, -0.4101242125625566, -0.7909132654327299],
     [-0.27991497606173854, 0.7771067359128687, -0.5636955979739449],
     [0.8458092393346607, 0.4773921357425044, 0.23812492391039797],
@@ -26,22 +31,23 @@ GENERIC_TURN = np.array([
 
 
 def directed_edges(faces: np.ndarray) -> np.ndarray:
-    """Return the edges (3 F, 2) of triangles (F, 3), each in the sense it is run."""
+    """Return the edges (3 F, 2) of triangles (F, 3), each as (start, end) in the sense
+    in which its triangle runs along it."""
     return np.stack([faces, faces[:, [1, 2, 0]]], -1).reshape(-1, 2)
 
 
 def edge_codes(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return one whole number (3 F,) for each edge, whichever way it is run, and whether
-    it is run from the lower vertex to the higher."""
+    """Return one whole number (3 F,) for each edge, in whichever sense a triangle runs
+    along it, and whether that is from the lower vertex to the higher."""
     count = int(faces.max(initial=-1)) + 1
     a, b = directed_edges(faces).T
     return np.minimum(a, b) * count + np.maximum(a, b), a < b
 
 
-def excess(faces: np.ndarray) -> np.ndarray:
-    """Return the edges (E, 2) that are run more often this way than the other.
+def excess_edges(faces: np.ndarray) -> np.ndarray:
+    """Return the edges (E, 2) along which more triangles run this way than the other.
 
-    An edge occurs as often as it lacks a triangle on its other side.
+    An edge is repeated as often as it lacks a triangle on its other side.
     """
     count = int(faces.max(initial=-1)) + 1
     codes, forward = edge_codes(faces)
@@ -54,8 +60,8 @@ def excess(faces: np.ndarray) -> np.ndarray:
 
 
 def neighbours(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return pairs (P, 2) of triangles across edges that two share, and whether both
-    run along theirs the same way (P,)."""
+    """Return the pairs (P, 2) of triangles that meet at an edge, where no others do,
+    and whether both run along the edge the same way (P,)."""
     codes, forward = edge_codes(faces)
     order = np.argsort(codes, kind="stable")
     starts = np.flatnonzero(np.diff(codes[order], prepend=-1))
@@ -66,34 +72,38 @@ def neighbours(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def shells(faces: np.ndarray) -> list[np.ndarray]:
-    """Return the shells of a mesh, as numbers of triangles.
+    """Return the shells of a mesh, as indices of triangles.
 
-    Triangles belong together across edges that two share. Where more meet at an edge,
-    surfaces that close by themselves are shells; the others there belong together.
+    Triangles belong together across edges at which no others meet. Where more than two
+    meet at an edge, surfaces that close by themselves are shells; the other surfaces
+    there belong together.
     """
     piece = pieces(faces)
     if piece.max() == 0:
         return [np.arange(len(faces))]
     members = _members(piece)
-    is_open = np.array([len(excess(faces[member])) > 0 for member in members])
+    is_open = np.array([len(excess_edges(faces[member])) > 0 for member in members])
+
+    # Join the open pieces that have an edge in common.
     codes, _ = edge_codes(faces)
-    owner = np.repeat(piece, 3)
-    loose = is_open[owner]
-    order = np.argsort(codes[loose], kind="stable")
-    same = np.diff(codes[loose][order]) == 0
-    owners = owner[loose][order]
-    joined = np.stack([owners[:-1][same], owners[1:][same]], -1)
-    return _members(_grouped(len(members), joined)[piece])
+    piece_of_edge = np.repeat(piece, 3)
+    is_loose = is_open[piece_of_edge]
+    order = np.argsort(codes[is_loose], kind="stable")
+    is_same = np.diff(codes[is_loose][order]) == 0
+    owners = piece_of_edge[is_loose][order]
+    joined = np.stack([owners[:-1][is_same], owners[1:][is_same]], -1)
+    return _members(_component_labels(len(members), joined)[piece])
 
 
 def pieces(faces: np.ndarray) -> np.ndarray:
-    """Return the number (F,) of each triangle's piece, which edges of more than two
-    triangles bound."""
-    return _grouped(len(faces), neighbours(faces)[0])
+    """Return the number (F,) of each triangle's piece; pieces are connected surfaces
+    that end at edges of more than two triangles."""
+    return _component_labels(len(faces), neighbours(faces)[0])
 
 
-def _grouped(count: int, pairs: np.ndarray) -> np.ndarray:
-    """Return the number (count,) of the connected part of each node of a graph."""
+def _component_labels(count: int, pairs: np.ndarray) -> np.ndarray:
+    """Return the number (count,) of the connected part of each node of a graph, from
+    the pairs (P, 2) of nodes that are linked."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -107,24 +117,31 @@ def _members(label: np.ndarray) -> list[np.ndarray]:
     return np.split(order, np.cumsum(np.bincount(label))[:-1])
 
 
-def oriented(faces: np.ndarray) -> np.ndarray | None:
-    """Return which triangles (F,) to turn so that neighbours agree on which side is
+def reversed_triangles(faces: np.ndarray) -> np.ndarray | None:
+    """Return which triangles (F,) to reverse so that neighbours agree on which side is
     out, the fewest of each shell; None if that is impossible."""
-    pairs, is_against = neighbours(faces)
+    pairs, runs_same_way = neighbours(faces)
     count = len(faces)
-    # Two nodes stand for each triangle, as it is and turned.
-    crossed = is_against * count
-    links = np.concatenate([
-        np.stack([pairs[:, 0], pairs[:, 1] + crossed], -1),
-        np.stack([pairs[:, 0] + count, pairs[:, 1] + count - crossed], -1),
-    ])  # fmt: skip
-    label = _grouped(2 * count, links)
-    as_is, turned = label[:count], label[count:]
-    if (as_is == turned).any():
+
+    # Two nodes stand for each triangle: k as it is, k + count reversed.
+    shift = runs_same_way * count
+    one = pairs[:, 0]
+    two = pairs[:, 1]
+    links = [
+        np.stack([one, two + shift], -1),
+        np.stack([one + count, two + count - shift], -1),
+    ]
+    label = _component_labels(2 * count, np.concatenate(links))
+    label_as_is = label[:count]
+    label_reversed = label[count:]
+    if (label_as_is == label_reversed).any():
         return None
-    n_as_is = np.bincount(as_is, minlength=label.max() + 1)
-    kept, other = n_as_is[as_is], n_as_is[turned]
-    return (kept < other) | ((kept == other) & (as_is > turned))
+
+    n_as_is = np.bincount(label_as_is, minlength=label.max() + 1)
+    n_kept = n_as_is[label_as_is]
+    n_other = n_as_is[label_reversed]
+    is_tie = n_kept == n_other
+    return (n_kept < n_other) | (is_tie & (label_as_is > label_reversed))
 
 
 def volume(corners: np.ndarray) -> float:
@@ -139,27 +156,27 @@ def area(corners: np.ndarray) -> float:
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=-1).sum() / 2)
 
 
-LONGEST_LOOP = 60  # edges of a hole that gets its least surface; the cost is cubic
-
-
 def caps(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
     """Return vertices and triangles (C, 3) that close the holes of a mesh, and the
     number of holes. Large holes take a new vertex in their middle."""
-    loops = _loops(excess(faces)[:, ::-1])
+    loops = _loops(excess_edges(faces)[:, ::-1])
     points = list(vertices)
-    out: list[tuple[int, int, int]] = []
+    triangles: list[tuple[int, int, int]] = []
     for loop in loops:
         if len(loop) > LONGEST_LOOP:
-            middle = vertices[loop].mean(0)
-            out += [(a, b, len(points)) for a, b in zip(loop, [*loop[1:], loop[0]])]
-            points.append(middle)
+            middle = len(points)
+            points.append(vertices[loop].mean(0))
+            following = [*loop[1:], loop[0]]
+            triangles += [(a, b, middle) for a, b in zip(loop, following)]
         else:
-            out += [(loop[i], loop[j], loop[k]) for i, j, k in _least(vertices[loop])]
-    return np.array(points), np.array(out, int).reshape(-1, 3), len(loops)
+            surface = _least_surface(vertices[loop])
+            triangles += [(loop[i], loop[j], loop[k]) for i, j, k in surface]
+    return np.array(points), np.array(triangles, int).reshape(-1, 3), len(loops)
 
 
 def _loops(edges: np.ndarray) -> list[list[int]]:
-    """Return loops of vertices, without repetition, that run along directed edges."""
+    """Return loops of vertices, each vertex once, that run along directed edges
+    (E, 2)."""
     ahead: dict[int, list[int]] = {}
     for a, b in edges.tolist():
         ahead.setdefault(a, []).append(b)
@@ -178,10 +195,12 @@ def _loops(edges: np.ndarray) -> list[list[int]]:
     return loops
 
 
-def _least(points: np.ndarray) -> list[tuple[int, int, int]]:
-    """Return triangles of least total area that span a loop of points (N, 3).
+def _least_surface(points: np.ndarray) -> list[tuple[int, int, int]]:
+    """Return triangles of least total area that span a loop of points (N, 3), by
+    dynamic programming.
 
-    least[i, j] is that of the part of the loop from i to j (dynamic programming).
+    least[i, j] is twice that area for the part of the loop from i to j, and choice[i,
+    j] the third corner of the triangle at the line from i to j.
     """
     count = len(points)
     least = np.zeros((count, count))
@@ -196,14 +215,16 @@ def _least(points: np.ndarray) -> list[tuple[int, int, int]]:
             best = int(costs.argmin())
             choice[i, j] = middle[best]
             least[i, j] = costs[best]
-    out, parts = [], [(0, count - 1)]
+
+    triangles = []
+    parts = [(0, count - 1)]
     while parts:
         i, j = parts.pop()
         if j - i > 1:
             k = int(choice[i, j])
-            out.append((i, k, j))
+            triangles.append((i, k, j))
             parts += [(i, k), (k, j)]
-    return out
+    return triangles
 
 
 def nearly_closes(vertices: np.ndarray, faces: np.ndarray) -> bool:
@@ -213,8 +234,8 @@ def nearly_closes(vertices: np.ndarray, faces: np.ndarray) -> bool:
 
 
 def without_walls(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Return a closed shell (F, 3) without its pieces that have the body on both sides;
-    Refusal if one has it in part."""
+    """Return the triangles (F, 3) of a closed shell without its pieces that have the
+    body on both sides; Refusal if a piece has it there in part."""
     piece = pieces(faces)
     if piece.max() == 0:
         return faces
@@ -223,6 +244,8 @@ def without_walls(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     normal = np.cross(b - a, c - a)
     size = np.linalg.norm(normal, axis=-1)
     normal /= np.maximum(size, np.finfo(float).tiny)[:, None]
+
+    # A triangle is part of a wall if points just outside it lie in the body.
     gap = CLEARANCE * float(np.ptp(corners, axis=(0, 1)).max())
     sense = np.sign(volume(corners))
     is_wall = winding(corners.mean(1) + sense * gap * normal, corners) != 0
@@ -230,12 +253,12 @@ def without_walls(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     hidden = np.bincount(piece, is_wall * size)
     share = hidden / np.bincount(piece, size)
     if ((share > 0.01) & (share < 0.99)).any():
-        raise _crossing()
+        raise _crossing_refusal()
     return faces[share[piece] < 0.5]
 
 
 def is_enclosed(vertices: np.ndarray, parts: list[np.ndarray]) -> np.ndarray:
-    """Return which of some closed shells, each as triangles (F_k, 3), lie inside
+    """Return which closed shells (K,), each given as triangles (F_k, 3), lie inside
     others; Refusal if two cross or touch."""
     count = len(parts)
     require(
@@ -246,6 +269,8 @@ def is_enclosed(vertices: np.ndarray, parts: list[np.ndarray]) -> np.ndarray:
     inside = np.zeros(count, bool)
     if count == 1:
         return inside
+
+    # Pairs of shells whose boxes meet.
     corners = [vertices[part] for part in parts]
     lows = np.array([c.min((0, 1)) for c in corners])
     highs = np.array([c.max((0, 1)) for c in corners])
@@ -254,18 +279,20 @@ def is_enclosed(vertices: np.ndarray, parts: list[np.ndarray]) -> np.ndarray:
     for axis in range(3):
         meet &= lows[:, None, axis] - gap <= highs[None, :, axis] + gap
     meet &= meet.T
+
     for one, two in np.argwhere(np.triu(meet, 1)):
         low = np.maximum(lows[one], lows[two]) - gap
         high = np.minimum(highs[one], highs[two]) + gap
-        near = [_within(corners[k], low, high) for k in (one, two)]
-        if _cross(near[0], near[1], gap) or _cross(near[1], near[0], gap):
-            raise _crossing()
+        near_one = _triangles_in_box(corners[one], low, high)
+        near_two = _triangles_in_box(corners[two], low, high)
+        if _pierces(near_one, near_two, gap) or _pierces(near_two, near_one, gap):
+            raise _crossing_refusal()
         inside[one] |= _is_inside(corners[one], corners[two], gap)
         inside[two] |= _is_inside(corners[two], corners[one], gap)
     return inside
 
 
-def _crossing() -> Refusal:
+def _crossing_refusal() -> Refusal:
     return Refusal(
         "parts of the mesh cross or touch",
         because="grains do not touch the faces of one that lie in another",
@@ -273,8 +300,10 @@ def _crossing() -> Refusal:
     )
 
 
-def _within(corners: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Return the triangles whose boxes meet a box."""
+def _triangles_in_box(
+    corners: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
+    """Return the triangles (K, 3, 3) whose bounding boxes meet a box."""
     meets = (corners.min(1) <= high).all(-1) & (corners.max(1) >= low).all(-1)
     return corners[meets]
 
@@ -287,80 +316,104 @@ def _is_inside(corners: np.ndarray, others: np.ndarray, gap: float) -> bool:
     flat = size <= 1e-14 * size.max()
     out = normal[~flat] / size[~flat, None] * np.sign(volume(corners))
     points = corners[~flat].mean(1) + gap * out
-    low, high = others.min((0, 1)), others.max((0, 1))
-    near = ((points >= low) & (points <= high)).all(-1)
-    found = np.zeros(len(points), bool)
-    if near.any():
-        found[near] = winding(points[near], others) != 0
-    if found.any() and not found.all():
-        raise _crossing()
-    return bool(found.all())
+
+    low = others.min((0, 1))
+    high = others.max((0, 1))
+    is_near = ((points >= low) & (points <= high)).all(-1)
+    is_inside = np.zeros(len(points), bool)
+    if is_near.any():
+        is_inside[is_near] = winding(points[is_near], others) != 0
+    if is_inside.any() and not is_inside.all():
+        raise _crossing_refusal()
+    return bool(is_inside.all())
 
 
 def winding(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Return how often closed triangles (F, 3, 3) wind round points (N, 3), 1 inside a
-    body: the signed number of triangles above each."""
+    """Return how often closed triangles (F, 3, 3) wind round points (N, 3): the signed
+    number of triangles above each, 1 inside a body and 0 outside."""
     origin = corners[0, 0]
-    points = (points - origin) @ GENERIC_TURN
-    corners = (corners - origin) @ GENERIC_TURN
+    points = (points - origin) @ OBLIQUE_ROTATION
+    corners = (corners - origin) @ OBLIQUE_ROTATION
     flat = points[:, :2]
+    low = corners[..., :2].min(1)
+    high = corners[..., :2].max(1)
     number = np.zeros(len(points), int)
-    for p, t in _meeting(flat, flat, corners[..., :2].min(1), corners[..., :2].max(1)):
+    for p, t in _meeting_boxes(flat, flat, low, high):
         relative = corners[t] - points[p, None]
-        x, y = relative[..., 0], relative[..., 1]
-        # Each edge is taken in one sense, so that neighbours agree on which has a point.
+        x = relative[..., 0]
+        y = relative[..., 1]
+        # Each edge is taken in one sense, so that neighbours agree on which has a
+        # point.
         sides = np.stack([_side(x, y, 0, 1), _side(x, y, 1, 2), _side(x, y, 2, 0)], -1)
         hit = (sides > 0).all(-1) | (sides < 0).all(-1)
-        sides, relative, p = sides[hit], relative[hit], p[hit]
+        sides = sides[hit]
+        relative = relative[hit]
+        p = p[hit]
+
+        # Where the ray upwards meets the triangle, by barycentric coordinates.
         weight = sides[:, [1, 2, 0]]
         height = (weight * relative[..., 2]).sum(-1) / weight.sum(-1)
-        above = height > 0
-        np.add.at(number, p[above], np.sign(sides[above, 0]).astype(int))
+        is_above = height > 0
+        np.add.at(number, p[is_above], np.sign(sides[is_above, 0]).astype(int))
     return number
 
 
 def _side(x: np.ndarray, y: np.ndarray, i: int, j: int) -> np.ndarray:
-    """Return the cross product of corners i and j, with the exact opposite sign for the
-    same edge in the other sense."""
-    swap = (x[:, i] > x[:, j]) | ((x[:, i] == x[:, j]) & (y[:, i] > y[:, j]))
-    a = np.where(swap, x[:, j], x[:, i]), np.where(swap, y[:, j], y[:, i])
-    b = np.where(swap, x[:, i], x[:, j]), np.where(swap, y[:, i], y[:, j])
-    return np.where(swap, -1.0, 1.0) * (a[0] * b[1] - a[1] * b[0])
+    """Return the cross products (K,) of corners i and j, at x and y (K, 3), with
+    exactly the opposite sign for the same edge in the other sense."""
+    x_i = x[:, i]
+    y_i = y[:, i]
+    x_j = x[:, j]
+    y_j = y[:, j]
+    is_reversed = (x_i > x_j) | ((x_i == x_j) & (y_i > y_j))
+    x_a = np.where(is_reversed, x_j, x_i)
+    y_a = np.where(is_reversed, y_j, y_i)
+    x_b = np.where(is_reversed, x_i, x_j)
+    y_b = np.where(is_reversed, y_i, y_j)
+    return np.where(is_reversed, -1.0, 1.0) * (x_a * y_b - y_a * x_b)
 
 
-def _cross(corners: np.ndarray, others: np.ndarray, gap: float) -> bool:
-    """Return whether an edge of triangles (F, 3, 3) pierces other triangles."""
+def _pierces(corners: np.ndarray, others: np.ndarray, gap: float) -> bool:
+    """Return whether an edge of triangles (F, 3, 3) pierces other triangles by more
+    than a gap, m."""
     if not (len(corners) and len(others)):
         return False
-    turned = (corners - others[0, 0]) @ GENERIC_TURN
-    others = (others - others[0, 0]) @ GENERIC_TURN
-    start = turned.reshape(-1, 3)
-    end = np.roll(turned, -1, 1).reshape(-1, 3)
-    once = start[:, 0] < end[:, 0]  # of the two triangles of an edge
-    start, end = start[once], end[once]
+    origin = others[0, 0]
+    corners = (corners - origin) @ OBLIQUE_ROTATION
+    others = (others - origin) @ OBLIQUE_ROTATION
+    start = corners.reshape(-1, 3)
+    end = np.roll(corners, -1, 1).reshape(-1, 3)
+    is_first = start[:, 0] < end[:, 0]  # of the two triangles of an edge
+    start = start[is_first]
+    end = end[is_first]
+
     a, b, c = np.moveaxis(others, 1, 0)
     normal = np.cross(b - a, c - a)
     size = np.linalg.norm(normal, axis=-1)
     unit = normal / np.maximum(size, np.finfo(float).tiny)[:, None]
-    low, high = np.minimum(start, end), np.maximum(start, end)
-    for e, t in _meeting(low, high, others.min(1), others.max(1)):
+    low = np.minimum(start, end)
+    high = np.maximum(start, end)
+    for e, t in _meeting_boxes(low, high, others.min(1), others.max(1)):
+        # Distances of the ends from the plane of the triangle.
         one = ((start[e] - a[t]) * unit[t]).sum(-1)
         two = ((end[e] - a[t]) * unit[t]).sum(-1)
         through = (one * two < 0) & (np.minimum(np.abs(one), np.abs(two)) > gap)
-        e, t, one, two = e[through], t[through], one[through], two[through]
-        share = one / (one - two)
+        e = e[through]
+        t = t[through]
+        share = one[through] / (one[through] - two[through])
         point = start[e] + share[:, None] * (end[e] - start[e])
-        depths = [
-            (np.cross(q - p, point - p) * unit[t]).sum(-1)
-            / np.linalg.norm(q - p, axis=-1)
-            for p, q in ((a[t], b[t]), (b[t], c[t]), (c[t], a[t]))
-        ]
+
+        # Distances of the point in the plane from the edges, positive inside.
+        depths = []
+        for p, q in ((a[t], b[t]), (b[t], c[t]), (c[t], a[t])):
+            turn = (np.cross(q - p, point - p) * unit[t]).sum(-1)
+            depths.append(turn / np.linalg.norm(q - p, axis=-1))
         if (np.min(depths, axis=0) > gap).any():
             return True
     return False
 
 
-def _meeting(
+def _meeting_boxes(
     low: np.ndarray, high: np.ndarray, low_b: np.ndarray, high_b: np.ndarray
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield pairs of boxes that meet, as indices into the first and the second boxes.
@@ -372,44 +425,53 @@ def _meeting(
     extent = np.maximum(high[:, :2].max(0), high_b[:, :2].max(0)) - origin
     cells = int(np.clip(np.sqrt(len(low_b)), 1, FINEST_GRID))
     while True:
+        # A grid in which boxes cover many cells is made coarser.
         scale = cells / np.maximum(extent, np.finfo(float).tiny)
-        spans = [
-            _span((x[:, :2] - origin) * scale, cells)
-            for x in (low, high, low_b, high_b)
-        ]
-        filled = np.prod(spans[3] - spans[2] + 1, axis=1).sum()
-        crowded = np.prod(spans[1] - spans[0] + 1, axis=1).sum()
-        if cells == 1 or filled + crowded < 20 * (len(low) + len(low_b)) + 1_000_000:
+        first = _cell_numbers((low[:, :2] - origin) * scale, cells)
+        last = _cell_numbers((high[:, :2] - origin) * scale, cells)
+        first_b = _cell_numbers((low_b[:, :2] - origin) * scale, cells)
+        last_b = _cell_numbers((high_b[:, :2] - origin) * scale, cells)
+        covered = np.prod(last - first + 1, axis=1).sum()
+        covered_b = np.prod(last_b - first_b + 1, axis=1).sum()
+        n_boxes = len(low) + len(low_b)
+        if cells == 1 or covered + covered_b < 20 * n_boxes + 1_000_000:
             break
         cells //= 2
-    index, cell = _filled(spans[0], spans[1], cells)
-    index_b, cell_b = _filled(spans[2], spans[3], cells)
+
+    index, cell = _covered_cells(first, last, cells)
+    index_b, cell_b = _covered_cells(first_b, last_b, cells)
     order = np.argsort(cell_b, kind="stable")
-    index_b, cell_b = index_b[order], cell_b[order]
-    first = np.searchsorted(cell_b, cell, "left")
-    count = np.searchsorted(cell_b, cell, "right") - first
+    index_b = index_b[order]
+    cell_b = cell_b[order]
+
+    # Each entry of index meets those of index_b from ``start`` on, ``count`` of them.
+    start = np.searchsorted(cell_b, cell, "left")
+    count = np.searchsorted(cell_b, cell, "right") - start
     total = np.cumsum(count)
     begin = 0
     while begin < len(index):
-        done = total[begin - 1] if begin else 0
-        end = max(begin + 1, int(np.searchsorted(total, done + PAIRS_AT_ONCE)))
-        some = slice(begin, end)
-        one = np.repeat(index[some], count[some])
-        nth = np.arange(len(one)) - np.repeat(
-            total[some] - count[some] - done, count[some]
-        )
-        two = index_b[np.repeat(first[some], count[some]) + nth]
+        n_before = total[begin - 1] if begin else 0
+        end = int(np.searchsorted(total, n_before + PAIRS_AT_ONCE))
+        end = max(begin + 1, end)
+        chunk = slice(begin, end)
+        one = np.repeat(index[chunk], count[chunk])
+        n_earlier = np.repeat(total[chunk] - count[chunk] - n_before, count[chunk])
+        nth = np.arange(len(one)) - n_earlier
+        two = index_b[np.repeat(start[chunk], count[chunk]) + nth]
         meets = ((low[one] <= high_b[two]) & (high[one] >= low_b[two])).all(-1)
         yield one[meets], two[meets]
         begin = end
 
 
-def _span(places: np.ndarray, cells: int) -> np.ndarray:
+def _cell_numbers(places: np.ndarray, cells: int) -> np.ndarray:
     return np.clip(np.floor(places), 0, cells - 1).astype(int)
 
 
-def _filled(first: np.ndarray, last: np.ndarray, cells: int):
-    """Return (number of the box, number of the cell) of all cells that boxes cover."""
+def _covered_cells(
+    first: np.ndarray, last: np.ndarray, cells: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return (number of the box, number of the cell) of all cells that boxes cover,
+    from the first and the last cell (N, 2) of each box along both axes."""
     width = last - first + 1
     count = width.prod(1)
     index = np.repeat(np.arange(len(count)), count)

@@ -15,7 +15,12 @@ from rft.core.refusal import require
 from rft.terradynamics.meshes import shapes
 from rft.terradynamics.meshes.blade import blade
 from rft.terradynamics.meshes.files import read
-from rft.terradynamics.meshes.mesh import MOST_TRIANGLES, Mesh, mirrored, quartered
+from rft.terradynamics.meshes.mesh import (
+    MOST_TRIANGLES,
+    Mesh,
+    mirror_image,
+    quartered_mesh,
+)
 from rft.terradynamics.meshes.smooth import smooth
 
 # Triangles of the finest mesh in studies of accuracy, which stands for the exact
@@ -191,7 +196,7 @@ class Screw(Solid):
         else:
             mesh = self._with_smooth_thread(triangles)
         if self.handed == "left":
-            return mirrored(mesh)
+            return mirror_image(mesh)
         return mesh
 
     def _with_smooth_thread(self, triangles: int) -> Mesh:
@@ -326,7 +331,7 @@ class MeshFile(Solid):
         in_range("triangles", triangles, 1, MOST_TRIANGLES, whole=True)
         mesh = self._mesh
         while 4 * len(mesh.faces) <= triangles:
-            mesh = quartered(mesh)
+            mesh = quartered_mesh(mesh)
         return mesh
 
     @property

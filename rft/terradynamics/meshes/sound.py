@@ -1,7 +1,7 @@
 """Sound meshes from the triangles of files and models, with notes of what was mended.
 
-Grains touch the outside of closed shells, and both sides of sheets. So shells inside
-others, walls between parts and doubles are left out.
+Grains touch the outside of closed shells, and both sides of sheets. Shells inside
+others, walls between parts and doubles are therefore left out.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 
 from rft.core.refusal import Refusal, require
 from rft.terradynamics.meshes import shells
-from rft.terradynamics.meshes.mesh import FLAT, MOST_TRIANGLES, Mesh, require_known
+from rft.terradynamics.meshes.mesh import FLAT, MOST_TRIANGLES, Mesh, require_vertices
 
 SMALLEST = 1e-3  # m: a smaller mesh is a few grains large; assumed to be a wrong scale
 LARGE = 1.0  # m: a larger one is noted
@@ -26,7 +26,7 @@ OPEN_CURE = "close it, or say closed = false if it is a sheet"
 
 
 class Sound(NamedTuple):
-    """A mesh, and notes (lines) of what was mended."""
+    """A sound mesh, and notes, one line each, of what was mended in it."""
 
     mesh: Mesh
     notes: tuple[str, ...]
@@ -38,16 +38,16 @@ def sound(
     """Return the sound mesh of triangles; Refusal if they enclose nothing.
 
     Corners within rounding are welded where triangles do not meet, holes are filled if
-    the mesh nearly closes, triangles are turned to agree on which side is out.
+    the mesh nearly closes, and triangles are reversed to agree on which side is out.
 
     Parameters
     ----------
     vertices : (V, 3), m.
     faces : (F, 3), indices of vertices.
     closed : False for sheets, of which either side may lead (`Mesh.two_sided`). Shells
-        that close are then solids all the same; refused if none is a sheet, or if one
-        nearly closes.
-    cure : what to do about a mesh that is open.
+        that close are solids even so. Refused if none is a sheet, or if one nearly
+        closes.
+    cure : advice in the refusal of a mesh that is open.
 
     Examples
     --------
@@ -66,12 +66,13 @@ def sound(
         0 < len(faces) <= MOST_TRIANGLES,
         f"a mesh has 1 to {MOST_TRIANGLES:,} triangles, got {len(faces):,}",
     )
-    require_known(faces, len(vertices))
-    return _Mender(vertices, faces, cure).mended(closed)
+    require_vertices(faces, len(vertices))
+    return _Mender(vertices, faces, cure).mend(closed)
 
 
 def size_note(mesh: Mesh, cure: str) -> list[str]:
-    """Return a note on a mesh of a size that is likely not meant, else none."""
+    """Return a list of one note on the size of a mesh if it is likely not meant, else
+    an empty list."""
     size = float(np.ptp(mesh.vertices, axis=0).max())
     if SMALLEST <= size <= LARGE:
         return []
@@ -80,11 +81,23 @@ def size_note(mesh: Mesh, cure: str) -> list[str]:
 
 def _counted(count: int, noun: str) -> str:
     """Return a number with its noun, such as "2 holes"."""
-    return f"{count:,} {noun}" if count == 1 else f"{count:,} {noun}s"
+    if count == 1:
+        return f"{count:,} {noun}"
+    return f"{count:,} {noun}s"
+
+
+class _Weld(NamedTuple):
+    """Triangles (F, 3) after corners within a distance, m, were welded; how many
+    corners were welded, and how many edges still have an odd number of triangles."""
+
+    faces: np.ndarray
+    distance: float
+    n_corners: int
+    n_odd_edges: int
 
 
 class _Mender:
-    """Mends a mesh step by step, and keeps notes."""
+    """Mends a mesh step by step, and keeps notes of what it does."""
 
     def __init__(self, vertices: np.ndarray, faces: np.ndarray, cure: str):
         self.cure = cure
@@ -93,99 +106,110 @@ class _Mender:
         self.faces = index.reshape(-1)[faces]
         self.size = float(np.ptp(self.vertices[self.faces], axis=(0, 1)).max())
 
-    def note(self, count: int, noun: str, done: str) -> None:
+    def note(self, count: int, noun: str, what_was_done: str) -> None:
+        """Add a note, unless the count is 0."""
         if count:
-            self.notes.append(f"{_counted(count, noun)} {done}")
+            self.notes.append(f"{_counted(count, noun)} {what_was_done}")
 
-    def mended(self, closed: bool) -> Sound:
-        self.drop_points()
+    def mend(self, closed: bool) -> Sound:
+        """Return the sound mesh with all notes."""
+        self.drop_degenerate()
         self.drop_doubles(closed)
         if self.weld():
             self.drop_doubles(closed)
-        self.turn(closed)
+        self.orient(closed)
         if closed:
             self.drop_single_walls()
-        parts = shells.shells(self.faces)
-        is_open = [len(shells.excess(self.faces[part])) > 0 for part in parts]
-        solids = [part for part, loose in zip(parts, is_open) if not loose]
-        sheets = [part for part, loose in zip(parts, is_open) if loose]
+
+        solids = []
+        sheets = []
+        for part in shells.shells(self.faces):
+            is_open = len(shells.excess_edges(self.faces[part])) > 0
+            if is_open:
+                sheets.append(part)
+            else:
+                solids.append(part)
         if closed:
-            kept = self.closed(solids, sheets)
+            kept_shells = self.close_shells(solids, sheets)
         else:
-            kept = self.with_sheets(solids, sheets)
-        faces = self.without_flat(np.concatenate(kept))
-        self.refuse_folds(faces)
+            kept_shells = self.keep_sheets(solids, sheets)
+
+        faces = self.merge_flat(np.concatenate(kept_shells))
+        self.require_no_folds(faces)
         used, index = np.unique(faces, return_inverse=True)
         mesh = Mesh(self.vertices[used], index.reshape(-1, 3), closed)
         return Sound(mesh, tuple(self.notes))
 
-    def drop_points(self) -> None:
+    def drop_degenerate(self) -> None:
         """Leave out triangles with equal corners, which close nothing."""
-        a, b, c = self.faces.T
-        proper = (a != b) & (b != c) & (c != a)
-        flat = int((~proper).sum())
+        proper = _proper(self.faces)
+        n_dropped = len(self.faces) - len(proper)
         require(
-            bool(proper.any()),
-            f"{flat} of {len(proper)} triangles have no area",
+            len(proper) > 0,
+            f"{n_dropped} of {len(self.faces)} triangles have no area",
             because="clean the mesh",
         )
-        self.faces = self.faces[proper]
-        self.note(flat, "triangle", "without area left out")
+        self.faces = proper
+        self.note(n_dropped, "triangle", "without area left out")
 
     def weld(self) -> bool:
-        """Weld corners of open edges within rounding; return whether that closes any."""
+        """Weld corners of open edges within rounding, at the distance that closes most;
+        return whether any closes."""
+        odd = self.odd_edges(self.faces)
+        if not len(odd):
+            return False
+        corners = np.unique([odd // len(self.vertices), odd % len(self.vertices)])
+        rounding = 2 * SINGLE * float(np.abs(self.vertices[self.faces]).max())
+        best = None
+        for share in ROUNDINGS:
+            weld = self.welded(corners, max(share * self.size, rounding))
+            if weld is None or not len(weld.faces):
+                continue
+            if best is None or weld.n_odd_edges < best.n_odd_edges:
+                best = weld
+        if best is None or best.n_odd_edges >= len(odd):
+            return False
+        n_dropped = len(self.faces) - len(best.faces)
+        self.faces = best.faces
+        self.notes.append(
+            f"corners within {best.distance:.2g} m of others welded: {best.n_corners:,}"
+        )
+        self.note(n_dropped, "triangle", "without area left out")
+        return True
+
+    def welded(self, corners: np.ndarray, distance: float) -> _Weld | None:
+        """Return the triangles after corners (indices of vertices) within a distance,
+        m, are made one; None if there are none."""
         from scipy.sparse import coo_matrix
         from scipy.sparse.csgraph import connected_components
         from scipy.spatial import cKDTree
 
-        loose = self.loose(self.faces)
-        if not len(loose):
-            return False
-        corners = np.unique([loose // len(self.vertices), loose % len(self.vertices)])
-        rounding = 2 * SINGLE * float(np.abs(self.vertices[self.faces]).max())
         tree = cKDTree(self.vertices[corners])
-        best = None
-        for share in ROUNDINGS:
-            distance = max(share * self.size, rounding)
-            pairs = tree.query_pairs(distance, output_type="ndarray")
-            if not len(pairs):
-                continue
-            graph = coo_matrix(
-                (np.ones(len(pairs)), tuple(pairs.T)), (len(corners), len(corners))
-            )
-            _, label = connected_components(graph, directed=False)
-            _, first = np.unique(label, return_index=True)
-            target = np.arange(len(self.vertices))
-            target[corners] = corners[first[label]]
-            faces = target[self.faces]
-            a, b, c = faces.T
-            faces = faces[(a != b) & (b != c) & (c != a)]
-            left = len(self.loose(faces))
-            if len(faces) and (best is None or left < best[0]):
-                best = left, faces, len(corners) - len(first), distance
-        if best is None or best[0] >= len(loose):
-            return False
-        dropped = len(self.faces) - len(best[1])
-        self.faces = best[1]
-        self.notes.append(
-            f"corners within {best[3]:.2g} m of others welded: {best[2]:,}"
-        )
-        self.note(dropped, "triangle", "without area left out")
-        return True
+        pairs = tree.query_pairs(distance, output_type="ndarray")
+        if not len(pairs):
+            return None
+        n = len(corners)
+        graph = coo_matrix((np.ones(len(pairs)), tuple(pairs.T)), (n, n))
+        _, label = connected_components(graph, directed=False)
+        _, first = np.unique(label, return_index=True)
+        target = np.arange(len(self.vertices))
+        target[corners] = corners[first[label]]
+        faces = _proper(target[self.faces])
+        return _Weld(faces, distance, n - len(first), len(self.odd_edges(faces)))
 
-    def loose(self, faces: np.ndarray) -> np.ndarray:
-        """Return codes of the edges that an odd number of triangles share."""
+    def odd_edges(self, faces: np.ndarray) -> np.ndarray:
+        """Return whole numbers for the edges that an odd number of triangles share."""
         a, b = shells.directed_edges(faces).T
         codes = np.minimum(a, b) * len(self.vertices) + np.maximum(a, b)
         unique, uses = np.unique(codes, return_counts=True)
         return unique[uses % 2 == 1]
 
     def drop_doubles(self, closed: bool) -> None:
-        """Leave out triangles that stand twice. Of triangles back to back one stays, if
-        they are sheets, or if they close a surface, by themselves or with others."""
+        """Leave out doubles. Of two triangles back to back one stays, if they are
+        sheets, or if they close a surface, by themselves or with others."""
         a, b, c = self.faces.T
         is_even = np.sum([a < b, b < c, c < a], axis=0) == 2
-        number = self.numbers()
+        number = self.corner_sets()
         _, first = np.unique(2 * number + is_even, return_index=True)
         self.note(len(number) - len(first), "double triangle", "left out")
         self.faces = self.faces[np.sort(first)]
@@ -195,16 +219,20 @@ class _Mender:
         surface = self.faces[back[:, 0]]
         parts = shells.shells(surface)
         if closed:
-            open_edges = self.loose(np.delete(self.faces, back.ravel(), axis=0))
-            rims = [self.loose(surface[part]) for part in parts]
-            parts = [p for p, rim in zip(parts, rims) if np.isin(rim, open_edges).all()]
+            rest = np.delete(self.faces, back.ravel(), axis=0)
+            open_edges = self.odd_edges(rest)
+            rims = [self.odd_edges(surface[part]) for part in parts]
+            parts = [
+                part for part, rim in zip(parts, rims) if np.isin(rim, open_edges).all()
+            ]
         if parts:
-            gone = back[np.concatenate(parts), 1]
-            self.note(len(gone), "triangle", "back to back with others left out")
-            self.faces = np.delete(self.faces, gone, axis=0)
+            dropped = back[np.concatenate(parts), 1]
+            self.note(len(dropped), "triangle", "back to back with others left out")
+            self.faces = np.delete(self.faces, dropped, axis=0)
 
-    def numbers(self) -> np.ndarray:
-        """Return the same whole number (F,) for triangles with the same corners."""
+    def corner_sets(self) -> np.ndarray:
+        """Return a whole number (F,) for each triangle, the same for triangles with the
+        same corners."""
         low, middle, high = np.sort(self.faces, 1).T
         count = len(self.vertices)
         _, pair = np.unique(low * count + middle, return_inverse=True)
@@ -213,78 +241,89 @@ class _Mender:
 
     def back_to_back(self) -> np.ndarray:
         """Return the pairs (P, 2) of triangles with the same corners."""
-        number = self.numbers()
+        number = self.corner_sets()
         uses = np.bincount(number)
         order = np.argsort(number, kind="stable")
         starts = np.cumsum(uses) - uses
         first = starts[uses == 2]
         return np.stack([order[first], order[first + 1]], -1)
 
-    def turn(self, closed: bool) -> None:
-        """Turn triangles so that neighbours agree on which side is out."""
-        turned = shells.oriented(self.faces)
-        if turned is None and not closed:
+    def orient(self, closed: bool) -> None:
+        """Reverse triangles so that neighbours agree on which side is out."""
+        is_reversed = shells.reversed_triangles(self.faces)
+        if is_reversed is None and not closed:
             return
         require(
-            turned is not None,
+            is_reversed is not None,
             "the mesh has one side only, as a Moebius strip",
             instead="mend it in the program that made it",
         )
-        self.faces[turned] = self.faces[turned][:, ::-1]
-        self.note(int(turned.sum()), "triangle", "wound against the others turned")
+        self.faces[is_reversed] = self.faces[is_reversed][:, ::-1]
+        count = int(is_reversed.sum())
+        self.note(count, "triangle", "wound against the others turned")
 
     def drop_single_walls(self) -> None:
-        """Leave out surfaces that end at edges of others, if a body closes without."""
+        """Leave out the surface that ends at edges of others and lies within the body
+        that is left, if there is one: of several, that which leaves the largest
+        body."""
         codes, _ = shells.edge_codes(self.faces)
         _, index, uses = np.unique(codes, return_inverse=True, return_counts=True)
-        odd = (uses % 2 == 1) & (uses > 2)
-        touched = odd[index.reshape(-1)].reshape(-1, 3).any(1)
-        if not touched.any():
+        is_odd = (uses % 2 == 1) & (uses > 2)
+        is_at_odd_edge = is_odd[index.reshape(-1)].reshape(-1, 3).any(1)
+        if not is_at_odd_edge.any():
             return
-        label = shells.pieces(self.faces)
-        candidates = np.unique(label[touched])
-        best = None
+
+        piece = shells.pieces(self.faces)
+        candidates = np.unique(piece[is_at_odd_edge])
+        largest = 0.0
+        body = wall = None
         for candidate in candidates[:MOST_WALLS]:
-            rest = self.faces[label != candidate]
-            if not len(rest) or len(shells.excess(rest)):
+            is_wall = piece == candidate
+            rest = self.faces[~is_wall]
+            if not len(rest) or len(shells.excess_edges(rest)):
                 continue
             size = abs(shells.volume(self.vertices[rest]))
-            if best is None or size > best[0]:
-                best = size, candidate, rest
-        if best is None:
+            if body is None or size > largest:
+                largest = size
+                body = rest
+                wall = self.faces[is_wall]
+        if body is None:
             return
-        wall = self.faces[label == best[1]]
         middles = self.vertices[wall].mean(1)
-        if (shells.winding(middles, self.vertices[best[2]]) != 0).all():
+        if (shells.winding(middles, self.vertices[body]) != 0).all():
             self.note(len(wall), "triangle", "of a wall within the body left out")
-            self.faces = best[2]
+            self.faces = body
 
-    def closed(self, solids: list, sheets: list) -> list[np.ndarray]:
-        """Return the triangles (F, 3) of the outermost shells."""
+    def close_shells(self, solids: list, sheets: list) -> list[np.ndarray]:
+        """Return the triangles (F, 3) of the outermost shells, with holes filled;
+        Refusal for open surfaces outside of them. solids, sheets: indices of triangles,
+        of closed and of open shells."""
         solids = [self.faces[part] for part in solids]
-        filled = holes = inner = 0
+        n_holes = 0
+        n_added = 0
+        n_inner = 0
         added_area = 0.0
         for part in sheets:
             faces = self.faces[part]
             if not shells.nearly_closes(self.vertices, faces):
                 self.require_inside(faces, solids)
-                inner += len(faces)
+                n_inner += len(faces)
                 continue
             self.vertices, added, count = shells.caps(self.vertices, faces)
             added_area += shells.area(self.vertices[added])
             solids.append(np.concatenate([faces, added]))
-            filled += len(added)
-            holes += count
-        if holes:
+            n_added += len(added)
+            n_holes += count
+        if n_holes:
             total = sum(shells.area(self.vertices[faces]) for faces in solids)
             self.note(
-                holes,
+                n_holes,
                 "hole",
-                f"filled by {_counted(filled, 'triangle')}, "
+                f"filled by {_counted(n_added, 'triangle')}, "
                 f"{100 * added_area / total:.2g} % of the surface",
             )
-        self.note(inner, "triangle", "of open surfaces within the body left out")
-        return self.outermost(solids)
+        self.note(n_inner, "triangle", "of open surfaces within the body left out")
+        return self.outermost_shells(solids)
 
     def require_inside(self, faces: np.ndarray, solids: list[np.ndarray]) -> None:
         """Raise Refusal unless an open surface lies inside closed shells."""
@@ -293,46 +332,50 @@ class _Mender:
         for solid in solids:
             inside |= shells.winding(middles, self.vertices[solid]) != 0
         if not inside.all():
-            count = len(shells.excess(faces))
+            count = len(shells.excess_edges(faces))
             raise Refusal(
                 "the mesh is open",
                 because=f"{count} edges have one triangle",
                 instead=self.cure,
             )
 
-    def outermost(self, solids: list[np.ndarray]) -> list[np.ndarray]:
+    def outermost_shells(self, solids: list[np.ndarray]) -> list[np.ndarray]:
         """Return the shells that no other encloses, with their outside out."""
         count = sum(map(len, solids))
         solids = [shells.without_walls(self.vertices, faces) for faces in solids]
-        count -= sum(map(len, solids))
-        self.note(count, "triangle", "of walls within the body left out")
-        enclosed = shells.is_enclosed(self.vertices, solids)
-        kept = []
-        hidden = turned = 0
-        for faces, is_hidden in zip(solids, enclosed):
+        n_walls = count - sum(map(len, solids))
+        self.note(n_walls, "triangle", "of walls within the body left out")
+
+        is_enclosed = shells.is_enclosed(self.vertices, solids)
+        outermost = []
+        n_enclosed = 0
+        n_reversed = 0
+        for faces, is_hidden in zip(solids, is_enclosed):
             if is_hidden:
-                hidden += len(faces)
+                n_enclosed += len(faces)
                 continue
-            content = shells.volume(self.vertices[faces])
+            volume = shells.volume(self.vertices[faces])
             require(
-                abs(content) > FLAT * self.size**3,
+                abs(volume) > FLAT * self.size**3,
                 "a shell of the mesh encloses nothing",
                 instead=self.cure,
             )
-            if content < 0:
-                turned += len(faces)
-            kept.append(faces if content > 0 else faces[:, ::-1])
+            if volume < 0:
+                n_reversed += len(faces)
+                faces = faces[:, ::-1]
+            outermost.append(faces)
+        n_shells = _counted(int(is_enclosed.sum()), "shell")
         self.note(
-            hidden,
+            n_enclosed,
             "triangle",
-            f"of {_counted(int(enclosed.sum()), 'shell')} inside another left out, "
-            "as no grains touch them",
+            f"of {n_shells} inside another left out, as no grains touch them",
         )
-        self.note(turned, "triangle", "of shells that were inside out turned")
-        return kept
+        self.note(n_reversed, "triangle", "of shells that were inside out turned")
+        return outermost
 
-    def with_sheets(self, solids: list, sheets: list) -> list[np.ndarray]:
-        """Return the triangles of sheets, and of solids beside them."""
+    def keep_sheets(self, solids: list, sheets: list) -> list[np.ndarray]:
+        """Return the triangles (F, 3) of sheets and of the outermost closed shells;
+        Refusal if there is no sheet, or one nearly closes."""
         for part in sheets:
             require(
                 not shells.nearly_closes(self.vertices, self.faces[part]),
@@ -345,30 +388,32 @@ class _Mender:
             "closed = false is for sheets, and the mesh is closed",
             instead="leave closed = false out",
         )
-        kept = [self.faces[part] for part in sheets]
+        kept_shells = [self.faces[part] for part in sheets]
         if solids:
-            kept += self.outermost([self.faces[part] for part in solids])
+            kept_shells += self.outermost_shells([self.faces[part] for part in solids])
             self.note(len(solids), "closed shell", "beside sheets taken as solid")
-        return kept
+        return kept_shells
 
-    def without_flat(self, faces: np.ndarray) -> np.ndarray:
-        """Return faces without triangles of no area, and with the same surface.
+    def merge_flat(self, faces: np.ndarray) -> np.ndarray:
+        """Return the same surface without triangles of no area.
 
-        Of such a triangle and the one beyond its longest edge, with the fourth corner,
-        two others are made, until all have an area.
+        Such a triangle and the one beyond its longest edge are replaced by the two on
+        the other diagonal, again and again, until all have an area.
         """
         flat = np.flatnonzero(self.is_flat(faces))
-        count = len(flat)
-        for _ in range(10 * count if count <= MOST_FLAT else 0):
+        n_flat = len(flat)
+        most_flips = 10 * n_flat if n_flat <= MOST_FLAT else 0
+        for _ in range(most_flips):
             if not len(flat):
                 break
-            faces = self.flipped(faces, flat)
+            faces = self.flip_longest_edge(faces, flat)
             flat = np.flatnonzero(self.is_flat(faces))
-        self.note(count, "triangle", "without area merged with others")
+        self.note(n_flat, "triangle", "without area merged with others")
         return faces
 
-    def flipped(self, faces: np.ndarray, flat: np.ndarray) -> np.ndarray:
-        """Return faces after one turn of the longest edge of triangles ``flat``."""
+    def flip_longest_edge(self, faces: np.ndarray, flat: np.ndarray) -> np.ndarray:
+        """Return faces after the longest edge of the triangles ``flat`` (indices)
+        became the other diagonal of the quadrilateral that its two triangles form."""
         corners = self.vertices[faces[flat]]
         lengths = np.linalg.norm(np.roll(corners, -1, 1) - corners, axis=-1)
         which, side = np.unravel_index(lengths.argmax(), lengths.shape)
@@ -386,8 +431,8 @@ class _Mender:
         faces[two] = s, q, r
         return faces
 
-    def refuse_folds(self, faces: np.ndarray) -> None:
-        """Raise Refusal if triangles lie on their neighbours, back to back."""
+    def require_no_folds(self, faces: np.ndarray) -> None:
+        """Raise Refusal if triangles are folded back on their neighbours."""
         a, b, c = np.moveaxis(self.vertices[faces], 1, 0)
         normals = np.cross(b - a, c - a)
         sizes = np.linalg.norm(normals, axis=-1)
@@ -404,6 +449,13 @@ class _Mender:
         )
 
     def is_flat(self, faces: np.ndarray) -> np.ndarray:
+        """Return which triangles (F,) have no area but roundoff."""
         a, b, c = np.moveaxis(self.vertices[faces], 1, 0)
         areas = np.linalg.norm(np.cross(b - a, c - a), axis=-1) / 2
         return areas <= FLAT * self.size**2
+
+
+def _proper(faces: np.ndarray) -> np.ndarray:
+    """Return the triangles (F, 3) whose corners are three vertices."""
+    a, b, c = faces.T
+    return faces[(a != b) & (b != c) & (c != a)]
