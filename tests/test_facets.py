@@ -21,7 +21,7 @@ from rft.terradynamics.meshes import (
 from rft.terradynamics.meshes.blocks import Blocks
 from rft.terradynamics.meshes.contact import Motion, faces
 from rft.terradynamics.meshes.extruded import Extruded
-from rft.terradynamics.meshes.submerged import submerged
+from rft.terradynamics.meshes.submerged import submerged_part
 from rft.terradynamics.plates import CLeg, Polygon, RoundRod, StressMap
 from rft.terradynamics.walking.elements import Elements, Outlines
 from rft.terradynamics.walking.facets import Grains, Surface
@@ -38,7 +38,7 @@ def unit(shape):
 
 def test_what_of_a_triangle_is_below_is_what_cutting_it_leaves():
     corners = RNG.uniform(-1, 1, (500, 3, 3))
-    share, middle, moments = submerged(corners[..., 2].T)
+    share, middle, moments = submerged_part(corners[..., 2].T)
     parts, of = below(corners, corners[..., 2])
     area = lambda p: (
         np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=-1) / 2

@@ -33,15 +33,15 @@ def smoothstep_slope(n_dot_v, grazing_sine):
 
 
 @formula
-def rounded(n_dot_v, grazing_sine):
+def rounded_step(n_dot_v, grazing_sine):
     """Return n_dot_v / sqrt(n_dot_v^2 + grazing_sine^2), and 0 where a face trails."""
     size = maximum(sqrt(n_dot_v * n_dot_v + grazing_sine * grazing_sine), TINY)
     return maximum(n_dot_v, 0.0) / size
 
 
 @formula
-def rounded_slope(n_dot_v, grazing_sine):
-    """Return the slope of `rounded` by n_dot_v."""
+def rounded_step_slope(n_dot_v, grazing_sine):
+    """Return the slope of `rounded_step` by n_dot_v."""
     size = maximum(sqrt(n_dot_v * n_dot_v + grazing_sine * grazing_sine), TINY)
     slope = grazing_sine * grazing_sine / (size * size * size)
     return where(n_dot_v > 0.0, slope, 0.0)

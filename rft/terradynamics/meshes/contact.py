@@ -26,7 +26,7 @@ from rft.terradynamics.meshes.triples import (
     minus,
     plus,
     times,
-    weighted,
+    weighted_sum,
 )
 
 
@@ -141,8 +141,8 @@ def part_below(face, heights):
     share, middle, moments = part_of_triangle(-heights[0], -heights[1], -heights[2])
     a, b, c, n = corners_and_normal(face)
     depth = face.area * (moments[0] + moments[1] + moments[2])
-    arms = times(face.area, weighted(moments, a, b, c))
-    return Part(n, weighted(middle, a, b, c), face.area * share, depth, arms)
+    arms = times(face.area, weighted_sum(moments, a, b, c))
+    return Part(n, weighted_sum(middle, a, b, c), face.area * share, depth, arms)
 
 
 @formula
@@ -155,9 +155,9 @@ def whole_part(face, heights):
     total = d1 + d2 + d3
     third = 1.0 / 3.0
     moments = (d1 + total) / 12.0, (d2 + total) / 12.0, (d3 + total) / 12.0
-    middle = weighted((third, third, third), a, b, c)
+    middle = weighted_sum((third, third, third), a, b, c)
     depth = face.area * (moments[0] + moments[1] + moments[2])
-    arms = times(face.area, weighted(moments, a, b, c))
+    arms = times(face.area, weighted_sum(moments, a, b, c))
     return Part(n, middle, face.area, depth, arms)
 
 

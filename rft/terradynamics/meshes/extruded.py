@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 from rft.core.refusal import formatted, require
 from rft.formulas.vectors import formula, maximum, minimum, sqrt, where
-from rft.terradynamics.ground.lead import rounded, rounded_slope
+from rft.terradynamics.ground.lead import rounded_step, rounded_step_slope
 from rft.terradynamics.meshes.triples import UP, dot, minus, plus, times
 from rft.terradynamics.plates.stress import COEFFICIENTS, PER_CUBIC_METRE, StressMap
 
@@ -155,9 +155,9 @@ class Extruded:
     def lead(self, n_dot_v, grazing_sine, sheet=False):
         """Return the share of the traction that faces bear, 0 to 1; 1 on a thin sheet,
         of which either side leads."""
-        return where(sheet, 1.0, rounded(n_dot_v, grazing_sine))
+        return where(sheet, 1.0, rounded_step(n_dot_v, grazing_sine))
 
     @formula
     def lead_slope(self, n_dot_v, grazing_sine, sheet=False):
         """Return the slope of `lead` by n_dot_v."""
-        return where(sheet, 0.0, rounded_slope(n_dot_v, grazing_sine))
+        return where(sheet, 0.0, rounded_step_slope(n_dot_v, grazing_sine))

@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull, QhullError
 from rft.balance.backend import Note
 from rft.core.refusal import Refusal, formatted, located, require
 from rft.terradynamics.meshes import shapes, widened
-from rft.terradynamics.meshes.merged import resized
+from rft.terradynamics.meshes.merged import resize_faces
 from rft.terradynamics.meshes.mesh import Mesh
 from rft.terradynamics.meshes.smooth import smooth
 from rft.terradynamics.meshes.sound import size_note, sound
@@ -61,7 +61,7 @@ def mesh_of_elements(
         mesh = smooth(_solid_mesh(model, int(model.geom_dataid[geom]), hulls))
         reach = np.linalg.norm(np.ptp(mesh.vertices, axis=0)) / 2
         length = length or share * reach / PER_REACH_OF_MESH
-        return resized(mesh, length, MOST_ELEMENTS)
+        return resize_faces(mesh, length, MOST_ELEMENTS)
 
     radii = size if kind == "ellipsoid" else size[[0, 0, 0]]
     fineness = max(1, 2 + round(-math.log2(share)))

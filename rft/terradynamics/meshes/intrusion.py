@@ -18,7 +18,7 @@ from rft.terradynamics.ground import Ground, GroundEffect, ground_of
 from rft.terradynamics.meshes.contact import Motion, Part, load, velocity_of_middle
 from rft.terradynamics.meshes.law import Spatial
 from rft.terradynamics.meshes.mesh import Mesh, below
-from rft.terradynamics.meshes.submerged import submerged
+from rft.terradynamics.meshes.submerged import submerged_part
 
 
 class Wrench(NamedTuple):
@@ -193,7 +193,7 @@ def _full_triangles(
 def _cut_triangles(mesh: Mesh, index: np.ndarray, heights: np.ndarray) -> Part:
     """Return the parts of triangles that cross the surface, at heights (V,) of the
     vertices."""
-    share, middle, moments = submerged(heights[mesh.faces[index]].T)
+    share, middle, moments = submerged_part(heights[mesh.faces[index]].T)
     corners = mesh.vertices[mesh.faces[index]]
     area = mesh.areas[index]
     normal = mesh.middle_normals[index].T

@@ -25,7 +25,7 @@ SLENDER = 0.75  # edges over that length, above which triangles to be merged are
 CORNERS = 8.0
 
 
-def resized(mesh: Mesh, length: float, most: int) -> Mesh:
+def resize_faces(mesh: Mesh, length: float, most: int) -> Mesh:
     """Return a mesh whose faces have edges of about ``length``, m, as a list of
     triangles that need not meet.
 
@@ -37,7 +37,7 @@ def resized(mesh: Mesh, length: float, most: int) -> Mesh:
     is_long = _is_long(corners, length)
     is_changed = bool(is_long.any())
     while is_long.any():
-        corners, normals = _halved(corners, normals, is_long)
+        corners, normals = _halve(corners, normals, is_long)
         require(
             len(corners) <= most,
             f"it has more than {most} elements",
@@ -49,7 +49,7 @@ def resized(mesh: Mesh, length: float, most: int) -> Mesh:
 
     is_small = _areas(corners) < SMALL * length**2
     if is_small.any():
-        merged, merged_normals = _merged(corners[is_small], normals[is_small], length)
+        merged, merged_normals = _merge(corners[is_small], normals[is_small], length)
         if len(merged) < is_small.sum():
             is_changed = True
             corners = np.concatenate([corners[~is_small], merged])
@@ -79,7 +79,7 @@ def _is_long(corners: np.ndarray, length: float) -> np.ndarray:
     return edges > np.where(is_small, SLENDER, LONGEST) * length
 
 
-def _halved(corners, normals, is_long) -> tuple[np.ndarray, np.ndarray]:
+def _halve(corners, normals, is_long) -> tuple[np.ndarray, np.ndarray]:
     """Return corners and normals there, (F, 3, 3), with some triangles halved across
     their longest edges."""
     long = corners[is_long]
@@ -96,7 +96,7 @@ def _halved(corners, normals, is_long) -> tuple[np.ndarray, np.ndarray]:
     return out[0], out[1]
 
 
-def _merged(corners, normals, length: float) -> tuple[np.ndarray, np.ndarray]:
+def _merge(corners, normals, length: float) -> tuple[np.ndarray, np.ndarray]:
     """Return corners (G, 3, 3) and normals (G, 3) of faces that stand for triangles
     with normals (F, 3)."""
     area = _areas(corners)
@@ -127,10 +127,10 @@ def _merged(corners, normals, length: float) -> tuple[np.ndarray, np.ndarray]:
     moments = np.einsum("fki,fkj->fij", arms, arms)
     moments = moments + arm_of_middle[:, :, None] * arm_of_middle[:, None]
     moments = total(area[:, None, None] * moments / 12.0) / total_area[:, None, None]
-    return _triangles_of(place, n, size, moments), n
+    return _triangles_from_moments(place, n, size, moments), n
 
 
-def _triangles_of(place, n, area, moments) -> np.ndarray:
+def _triangles_from_moments(place, n, area, moments) -> np.ndarray:
     """Return corners (G, 3, 3) of triangles with middles and normals (G, 3), second
     moments (G, 3, 3) within their planes, and areas (G,)."""
     plane = np.eye(3) - n[:, :, None] * n[:, None]

@@ -20,7 +20,7 @@ def sphere(radius: float, fineness: int = 4) -> Mesh:
     in_range("fineness", fineness, 0, 7, whole=True)
     vertices, faces = _icosahedron()
     for _ in range(int(fineness)):
-        vertices, faces = _quartered(vertices, faces)
+        vertices, faces = _quarter_on_sphere(vertices, faces)
     size = np.linalg.norm(vertices, axis=-1, keepdims=True)
     return Mesh(radius * vertices / size, faces)
 
@@ -42,7 +42,7 @@ def _icosahedron() -> tuple[np.ndarray, np.ndarray]:
     return vertices, faces
 
 
-def _quartered(
+def _quarter_on_sphere(
     vertices: np.ndarray, faces: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return vertices and faces of a mesh with all corners on a sphere about the

@@ -162,7 +162,7 @@ class _Mender:
         rounding = 2 * SINGLE * float(np.abs(self.vertices[self.faces]).max())
         best = None
         for share in ROUNDINGS:
-            weld = self.welded(corners, max(share * self.size, rounding))
+            weld = self.try_weld(corners, max(share * self.size, rounding))
             if weld is None or not len(weld.faces):
                 continue
             if best is None or weld.n_odd_edges < best.n_odd_edges:
@@ -177,7 +177,7 @@ class _Mender:
         self.note(n_dropped, "triangle", "without area left out")
         return True
 
-    def welded(self, corners: np.ndarray, distance: float) -> _Weld | None:
+    def try_weld(self, corners: np.ndarray, distance: float) -> _Weld | None:
         """Return the triangles after corners (indices of vertices) within a distance,
         m, are made one; None if there are none."""
         from scipy.sparse import coo_matrix

@@ -34,8 +34,8 @@ def _tip(depth, following, preceding):
 
 @formula
 def part_of_triangle(d1, d2, d3):
-    """Return share, middle and moments, as `submerged` does, of a triangle with corners
-    at depths d1, d2, d3, m."""
+    """Return share, middle and moments, as `submerged_part` does, of a triangle with
+    corners at depths d1, d2, d3, m."""
     tip1, s1, t1 = _tip(d1, d2, d3)
     tip2, s2, t2 = _tip(d2, d3, d1)
     tip3, s3, t3 = _tip(d3, d1, d2)
@@ -65,7 +65,7 @@ def part_of_triangle(d1, d2, d3):
     return share, middle, moments
 
 
-def submerged(heights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def submerged_part(heights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return share (...,), middle (3, ...) and moments (3, ...), m, of triangles with
     corners at ``heights`` (3, ...), m.
 

@@ -45,6 +45,6 @@ def minus(a, b):
 
 
 @formula
-def weighted(weights, a, b, c):
+def weighted_sum(weights, a, b, c):
     """Return the sum of three triples a, b, c with three weights."""
     return plus(plus(times(weights[0], a), times(weights[1], b)), times(weights[2], c))

@@ -24,7 +24,7 @@ class VerticalEntry:
     source: str
 
 
-def _scaled(zeta: float, grains: str) -> VerticalEntry:
+def _scaled_entry(zeta: float, grains: str) -> VerticalEntry:
     """Return the entry of the generic set times zeta, which was fitted to
     ``grains``."""
     return VerticalEntry(
@@ -51,7 +51,7 @@ VERTICAL = {
         CLOSE,
         f"{OWN} 10 % more than by poppy-seeds-close-scaled, in three dimensions too",
     ),
-    "glass-3mm": _scaled(0.224, "3 mm glass spheres"),
-    "poppy-seeds-loose-scaled": _scaled(0.240, "loose poppy seeds"),
-    "poppy-seeds-close-scaled": _scaled(0.422, "close-packed poppy seeds"),
+    "glass-3mm": _scaled_entry(0.224, "3 mm glass spheres"),
+    "poppy-seeds-loose-scaled": _scaled_entry(0.240, "loose poppy seeds"),
+    "poppy-seeds-close-scaled": _scaled_entry(0.422, "close-packed poppy seeds"),
 }

@@ -24,7 +24,7 @@ from rft.formulas.vectors import (
 )
 from rft.laws.records import law_numbers, record_class
 from rft.terradynamics.ground.base import inverse_speed, strength_at
-from rft.terradynamics.ground.lead import mean_ramp, rounded
+from rft.terradynamics.ground.lead import mean_ramp, rounded_step
 from rft.terradynamics.plates.outline import Outline
 from rft.terradynamics.plates.stress import PER_CUBIC_METRE, PlateStress, alpha
 
@@ -97,7 +97,7 @@ class Force(NamedTuple):
 
 
 @formula
-def interpolated(a, b, t):
+def interpolate(a, b, t):
     """Return a + t (b - a), with t from 0 to 1."""
     return a + t * (b - a)
 
@@ -114,7 +114,7 @@ def negative_part(a, b):
 
 
 @formula
-def rotated(x, z, g):
+def world_components(x, z, g):
     """Return the components along the world's axes of a vector (x, z) in the body's
     frame."""
     return g.cos * x + g.sin * z, g.cos * z - g.sin * x
@@ -154,12 +154,12 @@ def leading_part(e, g, side, one_sided):
     share = maximum(last - first, 0.0)
     middle = 0.5 * (first + last)
 
-    a_x, a_z = rotated(
-        interpolated(e.x1, e.x2, middle), interpolated(e.z1, e.z2, middle), g
+    a_x, a_z = world_components(
+        interpolate(e.x1, e.x2, middle), interpolate(e.z1, e.z2, middle), g
     )
     depth = where(share > 0.0, -(g.z + a_z), 0.0)
-    n_x, n_z = rotated(
-        interpolated(e.nx1, e.nx2, middle), interpolated(e.nz1, e.nz2, middle), g
+    n_x, n_z = world_components(
+        interpolate(e.nx1, e.nx2, middle), interpolate(e.nz1, e.nz2, middle), g
     )
     to_unit = where(side < 0.0, -1.0, 1.0) / sqrt(n_x * n_x + n_z * n_z)
     n = to_unit * n_x, to_unit * n_z
@@ -177,9 +177,9 @@ def load(law, ground, e, g, side, one_sided, lead_of_middle):
     """Return the `Force` of the grains on an element: area x depth x stress x lead, and
     the grains' inertia.
 
-    side, one_sided: see `leading_part`. lead_of_middle: True for the lead `rounded` at
-    the part's middle, which is smooth where a body comes to rest; False for the mean
-    over the part of a lead that rises linearly."""
+    side, one_sided: see `leading_part`. lead_of_middle: True for the lead
+    `rounded_step` at the part's middle, which is smooth where a body comes to rest;
+    False for the mean over the part of a lead that rises linearly."""
     p = leading_part(e, g, side, one_sided)
     across = p.speed * (p.n[0] * p.v[0] + p.n[1] * p.v[1])
     slowness = inverse_speed(ground, p.speed)
@@ -187,12 +187,12 @@ def load(law, ground, e, g, side, one_sided, lead_of_middle):
     stress = PER_CUBIC_METRE * p.depth * p.speed * slowness * strength
 
     if one_sided and lead_of_middle:
-        lead = rounded(slowness * across, ground.grazing_sine)
+        lead = rounded_step(slowness * across, ground.grazing_sine)
         stress = stress * where(side == 0.0, 1.0, lead)
     elif one_sided and ground.grazing_sine > 0.0:
         across1, across2, _ = speeds_across(e, g, side)
-        first = interpolated(across1, across2, p.first)
-        last = interpolated(across1, across2, p.last)
+        first = interpolate(across1, across2, p.first)
+        last = interpolate(across1, across2, p.last)
         lead = mean_ramp(slowness * first, slowness * last, ground.grazing_sine)
         stress = stress * lead
 

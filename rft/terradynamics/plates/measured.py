@@ -73,14 +73,14 @@ class PlateDrags(PlateStress):
         object.__setattr__(self, "_interpolant", interpolant)
 
     def alpha_ahead(self, n, v) -> tuple[np.ndarray, np.ndarray]:
-        beta = _wrapped(np.arctan2(n[0], -n[1]))
+        beta = _principal_tilt(np.arctan2(n[0], -n[1]))
         gamma = np.arctan2(-v[1], v[0])
         angles = np.stack(np.broadcast_arrays(beta, gamma), axis=-1)
         alpha = self._interpolant(angles).reshape(angles.shape)
         return self.zeta * alpha[..., 0], self.zeta * alpha[..., 1]
 
 
-def _wrapped(beta):
+def _principal_tilt(beta):
     """Return the tilt within +-pi/2 of the same plate."""
     return beta - np.pi * np.round(beta / np.pi)
 
@@ -98,10 +98,10 @@ def _interpolant(beta, gamma, alpha_x, alpha_z):
     gamma = gamma - 2 * np.pi * np.round(gamma / (2 * np.pi))
     drags = np.stack([beta, gamma, alpha_x, alpha_z], -1)
     mirrored = drags * [-1, -1, -1, 1] + [0, np.pi, 0, 0]
-    rows = _with_period(drags, [0, 2 * np.pi, 0, 0])
-    rows = np.concatenate([rows, _with_period(mirrored, [0, 2 * np.pi, 0, 0])])
-    rows[:, 0] = _wrapped(rows[:, 0])
-    rows = _with_period(rows, [np.pi, 0, 0, 0])
+    rows = _periodic_copies(drags, [0, 2 * np.pi, 0, 0])
+    rows = np.concatenate([rows, _periodic_copies(mirrored, [0, 2 * np.pi, 0, 0])])
+    rows[:, 0] = _principal_tilt(rows[:, 0])
+    rows = _periodic_copies(rows, [np.pi, 0, 0, 0])
     is_near = (np.abs(rows[:, :2]) < np.pi + 1e-9).all(1)
     rows = rows[is_near]
 
@@ -114,7 +114,7 @@ def _interpolant(beta, gamma, alpha_x, alpha_z):
     return LinearNDInterpolator(angles, means)
 
 
-def _with_period(rows, period) -> np.ndarray:
+def _periodic_copies(rows, period) -> np.ndarray:
     """Return rows (N, 4), one after another shifted by -1, 0 and 1 times a period."""
     return np.concatenate([rows + k * np.array(period) for k in (-1, 0, 1)])
 

@@ -156,7 +156,7 @@ class SquareRod(Shape):
     def curve(self, elements: int):
         h = self.side / 2
         corners = np.array([[-h, -h], [h, -h], [h, h], [-h, h], [-h, -h]])
-        return _subdivided(corners, elements), None
+        return _element_ends(corners, elements), None
 
 
 @dataclass(frozen=True)
@@ -275,7 +275,7 @@ class Wheel(Shape):
         bars = self.lugs * (2 * self.lug_height + self.lug_width)
         n_arc = max(1, round(elements * rim / (rim + bars) / self.lugs))
         n_lug = max(3, round(elements * bars / (rim + bars) / self.lugs))
-        first_lug = _subdivided(self._lug_corners(half), n_lug)
+        first_lug = _element_ends(self._lug_corners(half), n_lug)
 
         points = []
         normals = []
@@ -323,7 +323,7 @@ class Polygon(Shape):
         Outline(_corners(self.points, self.closed), self.width)
 
     def curve(self, elements: int):
-        return _subdivided(_corners(self.points, self.closed), elements), None
+        return _element_ends(_corners(self.points, self.closed), elements), None
 
 
 @dataclass(frozen=True)
@@ -368,7 +368,7 @@ class Spline(Shape):
             curve[-1] = curve[0]
             tangent[-1] = tangent[0]
 
-        normal = _to_the_right(tangent) / np.hypot(*tangent.T)[:, None]
+        normal = _quarter_turn_right(tangent) / np.hypot(*tangent.T)[:, None]
         normals = np.stack([normal[:-1], normal[1:]], 1)
         x, z = curve.T
         if self.closed and np.sum(x[:-1] * z[1:] - x[1:] * z[:-1]) < 0:
@@ -390,7 +390,7 @@ SHAPES = {
 }
 
 
-def _to_the_right(vectors: np.ndarray) -> np.ndarray:
+def _quarter_turn_right(vectors: np.ndarray) -> np.ndarray:
     """Return vectors (..., 2) rotated by a quarter turn to the right, with x to the
     right and z up."""
     return np.stack([vectors[..., 1], -vectors[..., 0]], -1)
@@ -400,7 +400,7 @@ def _normals(points: np.ndarray) -> np.ndarray:
     """Return the unit normals (N, 2) to the right of elements between points
     (N + 1, 2)."""
     along = np.diff(points, axis=0)
-    return _to_the_right(along) / np.hypot(*along.T)[:, None]
+    return _quarter_turn_right(along) / np.hypot(*along.T)[:, None]
 
 
 def _arc(radius: float, begin: float, end: float, elements: int):
@@ -415,7 +415,7 @@ def _arc(radius: float, begin: float, end: float, elements: int):
     return radius * normal, np.stack([normal[:-1], normal[1:]], 1)
 
 
-def _subdivided(points, elements: int):
+def _element_ends(points, elements: int):
     """Return the ends of about ``elements`` elements along edges between points (N, 2).
 
     Elements are equal on each edge; their number is the edge's share of the length,
