@@ -178,4 +178,4 @@ def _separate_triangles(mesh: Mesh, corners: np.ndarray, normals: np.ndarray) ->
     for which they stand."""
     faces = np.arange(3 * len(corners)).reshape(-1, 3)
     corner_normals = np.repeat(normals[:, None], 3, axis=1)
-    return mesh.unchecked_copy(corners.reshape(-1, 3), faces, corner_normals)
+    return mesh._unchecked_copy(corners.reshape(-1, 3), faces, corner_normals)

@@ -138,7 +138,7 @@ class Mesh:
         """Return whether a triangle stands twice."""
         return len(np.unique(np.sort(self.faces, 1), axis=0)) < len(self.faces)
 
-    def unchecked_copy(self, vertices: np.ndarray, faces: np.ndarray, normals) -> Mesh:
+    def _unchecked_copy(self, vertices: np.ndarray, faces: np.ndarray, normals) -> Mesh:
         """Return a mesh of these vertices, faces and smooth normals that is as sound as
         this one.
 
@@ -224,7 +224,7 @@ class Mesh:
         if normals is not None:
             normals = np.concatenate([normals, -normals[back][:, ::-1]])
         faces = np.concatenate([self.faces, self.faces[back][:, ::-1]])
-        return self.unchecked_copy(self.vertices, faces, normals)
+        return self._unchecked_copy(self.vertices, faces, normals)
 
 
 def below(corners: np.ndarray, heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -304,7 +304,7 @@ def quartered_mesh(mesh: Mesh) -> Mesh:
         middles = [x / np.linalg.norm(x, axis=-1, keepdims=True) for x in middles]
         normals = _four_triangles(a, b, c, *middles)
     vertices, faces = cut_in_four(mesh.vertices, mesh.faces)
-    return mesh.unchecked_copy(vertices, faces, normals)
+    return mesh._unchecked_copy(vertices, faces, normals)
 
 
 def _four_triangles(a, b, c, ab, bc, ca) -> np.ndarray:
@@ -320,7 +320,7 @@ def mirror_image(mesh: Mesh) -> Mesh:
     normals = mesh.smooth_normals
     if normals is not None:
         normals = normals[:, ::-1] * mirror
-    return mesh.unchecked_copy(mesh.vertices * mirror, mesh.faces[:, ::-1], normals)
+    return mesh._unchecked_copy(mesh.vertices * mirror, mesh.faces[:, ::-1], normals)
 
 
 def require_vertices(faces: np.ndarray, count: int) -> None:
