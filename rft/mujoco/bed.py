@@ -16,7 +16,7 @@ from rft.terradynamics.ground import Ground
 from rft.terradynamics.meshes.blocks import Blocks
 from rft.terradynamics.meshes.contact import Face, Motion, faces
 from rft.terradynamics.meshes.extruded import Extruded
-from rft.terradynamics.meshes.geoms import described
+from rft.terradynamics.meshes.geoms import geom_label
 from rft.terradynamics.meshes.law import Spatial
 from rft.terradynamics.meshes.mesh import Mesh
 from rft.terradynamics.meshes.zones import Place, Zones, share_in
@@ -93,7 +93,7 @@ class Bed:
             laws, zones, ground, up, ahead, float(level * up[2]), Blocks(own),
             np.array(geoms, np.int64), bodies, model.body_rootid[bodies].astype(np.int64),
             np.array([last_dof(model, b) for b in bodies], np.int64), model.dof_parentid.astype(np.int64),
-            np.array(spheres), hills, names=tuple(described(model, g) for g in geoms),
+            np.array(spheres), hills, names=tuple(geom_label(model, g) for g in geoms),
         )  # fmt: skip
 
     def rounded(self, rounding: float) -> Bed:

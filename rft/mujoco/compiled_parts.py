@@ -43,7 +43,7 @@ from rft.terradynamics.meshes.zones import (
     Place,
     extent_in,
     share_in,
-    shared,
+    share_of_part,
 )
 
 FIELDS = 12  # vectors of eight that hold a part of eight faces
@@ -96,7 +96,7 @@ def cut_rows(table, spheres, begin, end, motion, zones, zone, place, cache, coun
             else:
                 part = whole_part(face, z)
             if zone >= 0:
-                part = shared(part, share_in(zones, zone, face, place))
+                part = share_of_part(part, share_in(zones, zone, face, place))
             i = FIELDS * count
             for j in range(3):
                 store(cache, i + j, part.n[j])

@@ -22,7 +22,7 @@ from rft.terradynamics.meshes.contact import (
     velocity_of_middle,
 )
 from rft.terradynamics.meshes.law import Spatial
-from rft.terradynamics.meshes.zones import Place, Zones, share_in, shared
+from rft.terradynamics.meshes.zones import Place, Zones, share_in, share_of_part
 
 
 class Frames(NamedTuple):
@@ -73,7 +73,7 @@ def cut(blocks: Blocks, laws, zones: Zones, ground: Ground, frames: Frames) -> G
             Zone(
                 law,
                 ground._replace(grazing_sine=law.grazing_sine),
-                part if share is None else shared(part, share),
+                part if share is None else share_of_part(part, share),
                 owner,
                 face.sheet > 0.0,
                 motion,

@@ -33,7 +33,7 @@ from rft.terradynamics.ground import (
     ground_of,
 )
 from rft.terradynamics.meshes.extruded import Extruded
-from rft.terradynamics.meshes.geoms import described, geom_name, mesh_of_elements
+from rft.terradynamics.meshes.geoms import geom_label, geom_name, mesh_of_elements
 from rft.terradynamics.meshes.law import Spatial
 from rft.terradynamics.meshes.mesh import Mesh
 from rft.terradynamics.plates import StressMap
@@ -462,7 +462,7 @@ def meshes(
     hulls: whether meshes without an inside stand for their convex hulls."""
     out = []
     for geom in geoms:
-        with located(f"the geom {described(model, geom)}"):
+        with located(f"the geom {geom_label(model, geom)}"):
             out.append(mesh_of_elements(model, geom, element, hulls))
     return out
 
@@ -502,7 +502,7 @@ def _elements_note(model: mujoco.MjModel, bed: Bed) -> str:
     most = int(np.argmax(counts))
     return (
         f"the sand has {counts.sum():,} elements, {counts[most]:,} of them on the geom"
-        f" {described(model, bed.geoms[most])}: steps take long; give fewer geoms, or a"
+        f" {geom_label(model, bed.geoms[most])}: steps take long; give fewer geoms, or a"
         " longer element"
     )
 

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from rft.core.refusal import Refusal, formatted, require
-from rft.terradynamics.meshes.geoms import described, geom_kind, geom_name, is_movable
+from rft.terradynamics.meshes.geoms import geom_kind, geom_label, geom_name, is_movable
 
 SOLID = ("sphere", "ellipsoid", "cylinder", "capsule", "box", "mesh")
 OVERLAP = 0.05  # depth, over the smaller geom's radius, from which an overlap is told
@@ -78,7 +78,7 @@ def can_touch(model: mujoco.MjModel, geom: int) -> bool:
 
 def _require_usable(model: mujoco.MjModel, geom: int) -> None:
     """Raise Refusal for a geom without an inside and for one that nothing moves."""
-    name, kind = described(model, geom), geom_kind(model, geom)
+    name, kind = geom_label(model, geom), geom_kind(model, geom)
     require(
         kind in SOLID,
         f"the geom {name} is a {kind} and has no inside",
@@ -140,7 +140,7 @@ def _bodies(model: mujoco.MjModel) -> dict[str, int]:
 
 def _note_of_left_out(model: mujoco.MjModel, left_out: list[int]) -> str:
     """Return the line about geoms that are not in the sand."""
-    names = ", ".join(described(model, g) for g in left_out[:1])
+    names = ", ".join(geom_label(model, g) for g in left_out[:1])
     more = f" and {len(left_out) - 1} more" if len(left_out) > 1 else ""
     return (
         f"the geom {names}{more}, which can touch nothing (contype = conaffinity = 0),"
@@ -164,7 +164,7 @@ def overlap_note(model: mujoco.MjModel, geoms: Sequence[int]) -> str:
     if not pairs:
         return ""
     names = ", ".join(
-        f"{described(model, a)} and {described(model, b)}" for a, b in pairs[:SHOWN]
+        f"{geom_label(model, a)} and {geom_label(model, b)}" for a, b in pairs[:SHOWN]
     )
     more = f" and {len(pairs) - SHOWN} more pairs" if len(pairs) > SHOWN else ""
     return (

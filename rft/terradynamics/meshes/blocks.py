@@ -20,7 +20,7 @@ from rft.terradynamics.meshes.contact import (
     record,
     velocity_of_middle,
 )
-from rft.terradynamics.meshes.zones import shared
+from rft.terradynamics.meshes.zones import share_of_part
 
 WIDTH = 8  # faces that compiled code computes at once, `rft.formulas.simd.WIDTH`
 
@@ -99,7 +99,7 @@ class Blocks:
         motion = Motion(*(np.moveaxis(x[owner], (0, 1), (-1, -2)) for x in motions))
         part = part_below(face, corner_heights(face, motion))
         if shares is not None:
-            part = shared(part, shares[under])
+            part = share_of_part(part, shares[under])
         velocity = velocity_of_middle(part, motion)
         is_sheet = face.sheet > 0.0
         force, moment, _ = load(law, ground, part, motion, velocity, is_sheet)

@@ -150,7 +150,7 @@ def geom_name(model: mujoco.MjModel, geom: int) -> str:
     return mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, geom) or f"geom {geom}"
 
 
-def described(model: mujoco.MjModel, geom: int) -> str:
+def geom_label(model: mujoco.MjModel, geom: int) -> str:
     """Return a text that tells a geom from others: its name, or its number with its
     body and group."""
     name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, geom)

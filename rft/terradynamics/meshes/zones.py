@@ -99,7 +99,7 @@ def share_beyond(face, normal, offset):
 
 
 @formula
-def shared(part, share):
+def share_of_part(part, share):
     """Return parts of faces with their area, depth and arms times a share."""
     depth = share * part.depth
     arms = times(share, part.arms)

@@ -19,7 +19,7 @@ read_element, _ = record_access(Element)
 
 
 @register_jitable
-def on_elements(law, ground, table, begin, end, g, side, lead_of_middle, sums):
+def force_on_elements(law, ground, table, begin, end, g, side, lead_of_middle, sums):
     """Return the `Force` on the elements in rows ``begin`` to ``end`` of a table
     (R, 9, 8). sums: (3, 8), overwritten."""
     x = z = moment = 0.0 * read(sums, 0)
@@ -56,7 +56,9 @@ def kernel(Law: type):
         for i in range(len(motions)):
             x, z, cos, sin, v_x, v_z, rate = motions[i]
             g = Motion(x, z, cos, sin, v_x, v_z, rate)
-            f = on_elements(law, ground, table, 0, len(table), g, side, False, sums)
+            f = force_on_elements(
+                law, ground, table, 0, len(table), g, side, False, sums
+            )
             out[0, i] += f.x
             out[1, i] += f.z
             out[2, i] += f.moment

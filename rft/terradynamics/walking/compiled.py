@@ -12,7 +12,7 @@ from rft.balance.cache import cached
 from rft.formulas.newton import plus, times
 from rft.formulas.simd import WIDTH, register_formulas
 from rft.terradynamics.ground import Ground
-from rft.terradynamics.plates.compiled import on_elements
+from rft.terradynamics.plates.compiled import force_on_elements
 from rft.terradynamics.walking.elements import BodyLoad, body_load, part_motion
 from rft.terradynamics.walking.planar import Robots, difference_steps, stage_residual
 from rft.terradynamics.walking.sdirk import (
@@ -50,7 +50,7 @@ def on_robot(law, ground, disturbed, robot, pose, twist, angle, rate, sums):
         part_ground = Ground(
             strength, flux, rounding, grazing_sine * closed[p], downhill_loss, disturbed
         )
-        f = on_elements(
+        f = force_on_elements(
             law, part_ground, table, blocks[p, 0], blocks[p, 1], g, side[p], True, sums
         )
         total = added(total, body_load(f, g, r_x, r_z, leg_rate))
