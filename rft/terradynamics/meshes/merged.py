@@ -22,7 +22,7 @@ LONGEST = 1.5  # edges over the wanted length, above which triangles are halved
 SMALL = 0.1  # area over the square of that length, below which triangles are merged
 SLENDER = 0.75  # edges over that length, above which triangles to be merged are halved
 # Square of the distance of a triangle's corners from its middle, if its variance is 1.
-CORNERS = 8.0
+SQUARED_REACH = 8.0
 
 
 def resize_faces(mesh: Mesh, length: float, most: int) -> Mesh:
@@ -140,7 +140,7 @@ def _triangles_from_moments(place, n, area, moments) -> np.ndarray:
     runs_clockwise = (np.cross(first, second) * n).sum(1) < 0.0
     second = np.where(runs_clockwise[:, None], -second, second)
 
-    lengths = np.sqrt(CORNERS * variance)
+    lengths = np.sqrt(SQUARED_REACH * variance)
     area_by_moments = 3**1.5 / 4 * lengths.prod(1)
     lengths *= np.sqrt(area / area_by_moments)[:, None]
     corners = []
