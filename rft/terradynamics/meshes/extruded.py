@@ -76,9 +76,10 @@ def traction_of_map(s, n, v, up=UP):
 
 @formula
 def slope_of_map(s, n, v, up, k):
-    """Return the slope of `traction_of_map` by the component k of v, for stress maps
-    that keep their tension. k: a unit vector along that component."""
-    n_z, k_z = dot(up, n), dot(up, k)
+    """Return the slope of `traction_of_map` by the component of v along the unit vector
+    k, for stress maps that keep their tension."""
+    n_z = dot(up, n)
+    k_z = dot(up, k)
     n_h = minus(n, times(n_z, up))
     k_h = minus(k, times(k_z, up))
     inner = dot(n, k) - n_z * k_z
