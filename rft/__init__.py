@@ -1,4 +1,5 @@
-"""Resistive force theory: force laws, bodies and the balance of forces. Gaits are in `geomech`."""
+"""Resistive force theory: force laws, bodies and the balance of forces. Gaits are in
+`geomech`."""
 
 import importlib
 import pkgutil
@@ -23,7 +24,9 @@ if TYPE_CHECKING:
     from rft.motion.stepping import TimeSteps, time_steps
     from rft.motion.work import Work, work_done
 
-SOLVER = 13  # version of the numbers, raised with every change of one; results of other versions are not resumed
+# version of the numbers, raised with every change of one; results of other versions are
+# not resumed
+SOLVER = 13
 _NAMES = {
     "rft.balance.velocity": "Solution body_velocity",
     "rft.bodies": "Backbone Body Chain ConstantCurvature Serpenoid",

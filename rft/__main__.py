@@ -1,5 +1,6 @@
-"""`python -m rft` compiles the solver, the contact with the ground, the steps of robots and, where MuJoCo is installed, the
-forces of grains in it, so that no later run has to."""
+"""`python -m rft` compiles the solver, the contact with the ground, the steps of robots
+and, where MuJoCo is installed, the forces of grains in it, so that no later run has
+to."""
 
 import importlib.util
 import sys
@@ -25,11 +26,9 @@ except ValueError as error:
 FOLDED = Granular(
     8.0, radians(35.0)
 )  # whose solutions fold at the shape below, so that a walk is taken along them
-law, stress, leg = (
-    CATALOGUE["glass-0.3mm-loose"].medium,
-    VERTICAL["generic"].stress,
-    CLeg(0.02, 0.01),
-)
+law = CATALOGUE["glass-0.3mm-loose"].medium
+stress = VERTICAL["generic"].stress
+leg = CLeg(0.02, 0.01)
 with preferring("numba"):
     body_velocity(law, Chain(), (1.0, 1.0), (1.0, 1.0))
     body_velocity(
@@ -42,7 +41,8 @@ with preferring("numba"):
         0.0,
     )
 
-    box, still = shapes.box((1.0, 1.0, 1.0)), np.zeros((1, 1, 3))
+    box = shapes.box((1.0, 1.0, 1.0))
+    still = np.zeros((1, 1, 3))
     for form in (Extruded(stress), Spatial(1e5)):
         blocks = Blocks([faces.faces(box.vertices[box.faces], box.normals)])
         blocks.loads(

@@ -1,4 +1,5 @@
-"""Beds of spherical grains with Hertz-Mindlin contacts: what they are made of, and which time step resolves them."""
+"""Beds of spherical grains with Hertz-Mindlin contacts: what they are made of, and
+which time step resolves them."""
 
 from __future__ import annotations
 
@@ -12,8 +13,12 @@ from rft.core.checks import Number, check_numbers
 from rft.core.metres import GRAVITY
 from rft.core.refusal import require
 
-PACKING = 0.56  # of all the bed, voids at floor and surface included, assumed to count grains; 0.6 within, measured
-SHARE = 0.2  # of the Rayleigh time: the largest time step (Otsubo et al., Comput. Geotech. 86, 67 (2017), discuss it)
+# of all the bed, voids at floor and surface included, assumed to count grains; 0.6
+# within, measured
+PACKING = 0.56
+# of the Rayleigh time: the largest time step (Otsubo et al., Comput. Geotech. 86, 67
+# (2017), discuss it)
+SHARE = 0.2
 PITCH = 1.02  # of the lattice that grains fall from, in largest diameters
 JITTER = 0.04  # of the lattice, diameters
 MOST_GRAINS = 2_000_000
@@ -26,15 +31,19 @@ Friction = Annotated[float, Number(0, 10, "-", "")]
 class Bed:
     """A bed of grains on a floor, which falls from a lattice and settles.
 
-    length, width, depth (m): along x, along y, and of the grains before anything moves. diameter (m): mean of the grains'.
-    spread (-): diameters are uniform within that share of the mean to both sides. density (kg/m^3): of a grain. young (Pa),
-    poisson (-): elastic constants of grains, body and floor. restitution (-): of all contacts. friction, body_friction,
-    floor_friction (-): between grains, of body and grain, of floor or wall and grain. settling_friction (-): between grains
-    while they settle, `friction` if None; less of it packs them closer. walled: sides are walls, else both directions are
-    periodic. seed: of the lattice and the diameters. time_step (s): `SHARE` of the Rayleigh time if None.
+    length, width, depth (m): along x, along y, and of the grains before anything moves.
+    diameter (m): mean of the grains'. spread (-): diameters are uniform within that
+    share of the mean to both sides. density (kg/m^3): of a grain. young (Pa), poisson
+    (-): elastic constants of grains, body and floor. restitution (-): of all contacts.
+    friction, body_friction, floor_friction (-): between grains, of body and grain, of
+    floor or wall and grain. settling_friction (-): between grains while they settle,
+    `friction` if None; less of it packs them closer. walled: sides are walls, else both
+    directions are periodic. seed: of the lattice and the diameters. time_step (s):
+    `SHARE` of the Rayleigh time if None.
 
-    The defaults are of plastic particles such as those of Maladen, Ding, Umbanhowar and Goldman, Int. J. Robot. Res. 30,
-    805 (2011), with a tenth of a per mille of their stiffness: assumed, as `friction` is.
+    The defaults are of plastic particles such as those of Maladen, Ding, Umbanhowar and
+    Goldman, Int. J. Robot. Res. 30, 805 (2011), with a tenth of a per mille of their
+    stiffness: assumed, as `friction` is.
 
     Examples
     --------
@@ -88,8 +97,8 @@ class Bed:
 
     @property
     def rayleigh_time(self) -> float:
-        """Time that a Rayleigh wave takes along the surface of the smallest grain, s: pi r sqrt(density/G) / (0.1631 poisson +
-        0.8766)."""
+        """Time that a Rayleigh wave takes along the surface of the smallest grain, s:
+        pi r sqrt(density/G) / (0.1631 poisson + 0.8766)."""
         shear = self.young / (2 * (1 + self.poisson))
         smallest = self.diameter / 2 * (1 - self.spread)
         return (
@@ -118,18 +127,19 @@ class Bed:
     def lattice(
         self, body: np.ndarray, radius: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return centres (N, 3), m, and diameters (N,), m, of grains on a cubic lattice with some jitter, layer by layer from
-        the floor at z = 0, none of which touches the spheres of a body.
+        """Return centres (N, 3), m, and diameters (N,), m, of grains on a cubic lattice
+        with some jitter, layer by layer from the floor at z = 0, none of which touches
+        the spheres of a body.
 
-        body: (n, 3), centres of its spheres, m, periodic as the bed. radius: (n,), m."""
+        body: (n, 3), centres of its spheres, m, periodic as the bed. radius: (n,),
+        m."""
         from scipy.spatial import cKDTree
 
         rng = np.random.default_rng(self.seed)
-        pitch, largest = (
-            PITCH * self.diameter * (1 + self.spread),
-            self.diameter * (1 + self.spread),
-        )
-        nx, ny = int(self.length / pitch), int(self.width / pitch)
+        pitch = PITCH * self.diameter * (1 + self.spread)
+        largest = self.diameter * (1 + self.spread)
+        nx = int(self.length / pitch)
+        ny = int(self.width / pitch)
         span = np.array([self.length, self.width])
         x, y = ((np.arange(n) + 0.5) * s / n - s / 2 for n, s in zip((nx, ny), span))
         layer = np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2)
@@ -141,7 +151,9 @@ class Bed:
         tree = cKDTree(
             np.concatenate([body + [*(span * image), 0.0] for image in images])
         )
-        radii, found, height = np.tile(radius, len(images)), [], 0.52 * largest
+        radii = np.tile(radius, len(images))
+        found = []
+        height = 0.52 * largest
         while sum(map(len, found)) < self.grains:
             points = np.column_stack([layer, np.full(len(layer), height)])
             points += rng.uniform(-JITTER / 2, JITTER / 2, points.shape) * self.diameter

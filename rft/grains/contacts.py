@@ -1,4 +1,5 @@
-"""Contacts and energies of grains, from their positions alone: what the engine does is held against them."""
+"""Contacts and energies of grains, from their positions alone: what the engine does is
+held against them."""
 
 from __future__ import annotations
 
@@ -11,7 +12,8 @@ from rft.grains.bed import Bed
 
 
 class Contacts(NamedTuple):
-    """Overlaps of touching spheres, in mean grain diameters, and the elastic energy of all contacts, J."""
+    """Overlaps of touching spheres, in mean grain diameters, and the elastic energy of
+    all contacts, J."""
 
     largest: float
     mean: float
@@ -19,8 +21,8 @@ class Contacts(NamedTuple):
 
 
 class Particles(NamedTuple):
-    """All spheres in a bed, (n, ...): centres and velocities (n, 3), m and m/s, spins (n, 3), rad/s, radii, m, and whether one
-    is of the body."""
+    """All spheres in a bed, (n, ...): centres and velocities (n, 3), m and m/s, spins
+    (n, 3), rad/s, radii, m, and whether one is of the body."""
 
     x: np.ndarray
     v: np.ndarray
@@ -32,8 +34,9 @@ class Particles(NamedTuple):
 def contacts(bed: Bed, p: Particles) -> Contacts:
     """Return the contacts of grains with each other, the body and the floor.
 
-    The energy is that of normal forces (Hertz, 8/15 E sqrt(R) overlap^(5/2), with E = young / (2 (1 - poisson^2)) and R the
-    harmonic sum of the radii); the springs of friction have none in it."""
+    The energy is that of normal forces (Hertz, 8/15 E sqrt(R) overlap^(5/2), with E =
+    young / (2 (1 - poisson^2)) and R the harmonic sum of the radii); the springs of
+    friction have none in it."""
     from scipy.spatial import cKDTree
 
     span = np.array([bed.length, bed.width, 0.0])
@@ -55,7 +58,8 @@ def contacts(bed: Bed, p: Particles) -> Contacts:
     )
     reduced = np.concatenate([r.prod(1) / r.sum(1), p.radius[grains]])
     touching = overlap > 0
-    overlap, reduced = overlap[touching], reduced[touching]
+    overlap = overlap[touching]
+    reduced = reduced[touching]
     stiff = bed.young / (2 * (1 - bed.poisson**2))
     elastic = 8 / 15 * stiff * float(np.sum(np.sqrt(reduced) * overlap**2.5))
     share = overlap / bed.diameter if overlap.size else np.zeros(1)
@@ -63,9 +67,11 @@ def contacts(bed: Bed, p: Particles) -> Contacts:
 
 
 def motion_energy(bed: Bed, p: Particles) -> float:
-    """Return the kinetic energy of the grains and their energy in gravity over the floor, J."""
+    """Return the kinetic energy of the grains and their energy in gravity over the
+    floor, J."""
     g = ~p.body
-    mass, r2 = bed.density * 4 / 3 * np.pi * p.radius[g] ** 3, p.radius[g] ** 2
+    mass = bed.density * 4 / 3 * np.pi * p.radius[g] ** 3
+    r2 = p.radius[g] ** 2
     kinetic = 0.5 * mass @ (p.v[g] ** 2).sum(1) + 0.2 * (mass * r2) @ (
         p.spin[g] ** 2
     ).sum(1)

@@ -9,17 +9,21 @@ import numpy as np
 from rft.core.refusal import require
 from rft.grains.experiment import Run
 
-END = 2.5  # half widths at either end that count as no flank: what a cap stirs up reaches so far
-SETTLED = 2.5  # half widths of travel after which the drag is taken for steady; the first 10 mm of a 12 mm rod are not
+# half widths at either end that count as no flank: what a cap stirs up reaches so far
+END = 2.5
+# half widths of travel after which the drag is taken for steady; the first 10 mm of a
+# 12 mm rod are not
+SETTLED = 2.5
 BLOCKS = 5  # parts of a steady drag, from whose scatter its error is computed
 
 
 class Drag(NamedTuple):
     """Drag on a rod, along it and across it (2,), positive where it opposes the motion.
 
-    flank: force on a length of flank, N/m. ends: force on both ends together beyond that of the flank, N: what the rod
-    bears, less its whole length of flank. lift: upward force on the whole rod, N. flank_error, ends_error, lift_error:
-    standard errors by the scatter of `BLOCKS` parts in time; beds differ by more."""
+    flank: force on a length of flank, N/m. ends: force on both ends together beyond
+    that of the flank, N: what the rod bears, less its whole length of flank. lift:
+    upward force on the whole rod, N. flank_error, ends_error, lift_error: standard
+    errors by the scatter of `BLOCKS` parts in time; beds differ by more."""
 
     flank: np.ndarray
     ends: np.ndarray
@@ -30,8 +34,9 @@ class Drag(NamedTuple):
 
 
 class Steady(NamedTuple):
-    """Steady force on a body that is towed: mean (3,), N, and standard error by the scatter of `BLOCKS` parts; the mean force
-    on each sphere (spheres, 3), N. lift: over drag, with its error."""
+    """Steady force on a body that is towed: mean (3,), N, and standard error by the
+    scatter of `BLOCKS` parts; the mean force on each sphere (spheres, 3), N. lift: over
+    drag, with its error."""
 
     force: np.ndarray
     error: np.ndarray
@@ -41,8 +46,9 @@ class Steady(NamedTuple):
 
 
 def steady(run: Run, half_width: float, angle: float, speed: float) -> Steady:
-    """Return the steady force on a body that was towed along a line, after `SETTLED` half widths. half_width (m): of the body.
-    angle (rad): of its velocity from x. speed (m/s)."""
+    """Return the steady force on a body that was towed along a line, after `SETTLED`
+    half widths. half_width (m): of the body. angle (rad): of its velocity from x. speed
+    (m/s)."""
     kept = _steady(run, half_width, speed)
     blocks = np.array([f.mean(0) for f in np.array_split(run.force[kept], BLOCKS)])
     direction = np.array([np.cos(angle), np.sin(angle)])
@@ -63,7 +69,8 @@ def _error(blocks: np.ndarray) -> np.ndarray:
 
 
 def _steady(run: Run, half_width: float, speed: float) -> np.ndarray:
-    """Return which samples (n,) are of a steady drag; ValueError if they are too few."""
+    """Return which samples (n,) are of a steady drag; ValueError if they are too
+    few."""
     kept = run.t * speed > SETTLED * half_width
     require(
         np.count_nonzero(kept) >= 4 * BLOCKS,
@@ -78,7 +85,8 @@ def flank_and_ends(
 ) -> Drag:
     """Return the drag on a round rod that was towed along a line.
 
-    length, half_width (m): of the rod, which lay along x. angle (rad): of its velocity from x. speed (m/s)."""
+    length, half_width (m): of the rod, which lay along x. angle (rad): of its velocity
+    from x. speed (m/s)."""
     kept = _steady(run, half_width, speed)
     reach = length / 2 - END * half_width
     flank = np.abs(run.along) < reach
@@ -94,10 +102,8 @@ def flank_and_ends(
         b[:, flank, :2].sum(1).mean(0) / (flank.sum() * spacing) for b in blocks
     ]
     whole = signs * [b[..., :2].sum(1).mean(0) for b in blocks]
-    ends, lift = (
-        whole - length * per_length,
-        np.array([b[..., 2].sum(1).mean() for b in blocks]),
-    )
+    ends = whole - length * per_length
+    lift = np.array([b[..., 2].sum(1).mean() for b in blocks])
     return Drag(
         per_length.mean(0),
         ends.mean(0),

@@ -1,4 +1,5 @@
-"""LAMMPS as the engine of a bed: spheres whose contacts it computes, and a body that a callback moves every step."""
+"""LAMMPS as the engine of a bed: spheres whose contacts it computes, and a body that a
+callback moves every step."""
 
 from __future__ import annotations
 
@@ -18,7 +19,9 @@ from rft.core.refusal import Refusal, require
 from rft.grains.bed import Bed
 from rft.grains.contacts import Particles
 
-OLDEST = 20250722  # version of LAMMPS that this has been tried with; older ones have other keywords of walls and pairs
+# version of LAMMPS that this has been tried with; older ones have other keywords of
+# walls and pairs
+OLDEST = 20250722
 CURE = "pip install 'geomech[grains]'"
 WATCH = 100  # steps between looks at a bed that settles
 SIGNALS = [
@@ -26,7 +29,9 @@ SIGNALS = [
     signal.SIGTERM,
     *([signal.SIGHUP] if hasattr(signal, "SIGHUP") else []),
 ]
-GRAINS, BODY = 1, 2  # types of atoms
+# types of atoms
+GRAINS = 1
+BODY = 2
 Forces = tuple[
     np.ndarray, np.ndarray
 ]  # on the spheres of the body (n, 3), N, and moments on them (n, 3), N m
@@ -36,8 +41,10 @@ Placing = Callable[
 
 
 def lammps() -> Any:
-    """Return the class of LAMMPS's Python module; Refusal, one line, where it is missing, or has no grains."""
-    # The wheel's library asks the loader for the MPI of the same environment, which is not on its path.
+    """Return the class of LAMMPS's Python module; Refusal, one line, where it is
+    missing, or has no grains."""
+    # The wheel's library asks the loader for the MPI of the same environment, which is
+    # not on its path.
     for library in Path(sys.prefix, "lib").glob("libmpi.so.12"):
         with contextlib.suppress(OSError):
             ctypes.CDLL(str(library), ctypes.RTLD_GLOBAL)
@@ -54,7 +61,8 @@ def lammps() -> Any:
 
 
 def opened() -> Any:
-    """Return a new LAMMPS that prints nothing; Refusal where it cannot do what is needed."""
+    """Return a new LAMMPS that prints nothing; Refusal where it cannot do what is
+    needed."""
     kind = lammps()
     try:
         engine = kind(cmdargs=["-screen", "none", "-log", "none"])
@@ -72,8 +80,8 @@ def opened() -> Any:
 
 
 class Engine:
-    """Grains and body in LAMMPS, from a data file or a restart file of it. `close` frees them; an ``Engine`` is used in a
-    with statement."""
+    """Grains and body in LAMMPS, from a data file or a restart file of it. `close`
+    frees them; an ``Engine`` is used in a with statement."""
 
     def __init__(
         self,
@@ -83,14 +91,17 @@ class Engine:
         restart: bool,
         friction: float | None = None,
     ):
-        self.bed, self.n_body = bed, n_body
+        self.bed = bed
+        self.n_body = n_body
         self.lmp = opened()
         edges = "f f f" if bed.walled else "p p f"
         material = f"hertz/material {bed.young:.17g} {bed.restitution:.17g} {bed.poisson:.17g} tangential mindlin NULL 1.0"
-        # Tsuji's polynomial is 3e-4 where the restitution is 1: a tenth of the energy of a swim in 0.2 s.
+        # Tsuji's polynomial is 3e-4 where the restitution is 1: a tenth of the energy
+        # of a swim in 0.2 s.
         damping = "tsuji" if bed.restitution < 1 else "coeff_restitution"
         contact = lambda mu: f"{material} {mu:.17g} damping {damping}"
-        x, y = bed.length / 2, bed.width / 2
+        x = bed.length / 2
+        y = bed.width / 2
         sides = f"""
             fix wall_x grains wall/gran granular {contact(bed.floor_friction)} xplane {-x:.17g} {x:.17g}
             fix wall_y grains wall/gran granular {contact(bed.floor_friction)} yplane {-y:.17g} {y:.17g}"""
@@ -129,8 +140,11 @@ class Engine:
                     self.lmp.command(line.strip())
 
     def steps(self, n: int, placing: Placing) -> None:
-        """Advance by n steps. placing: called n times, once before each step, with what acts on the body's spheres."""
-        end, box, placed = self.now + n, np.array([self.bed.length, self.bed.width]), 0
+        """Advance by n steps. placing: called n times, once before each step, with what
+        acts on the body's spheres."""
+        end = self.now + n
+        box = np.array([self.bed.length, self.bed.width])
+        placed = 0
 
         def place(step: int, n_local: int, tag: np.ndarray, x: np.ndarray) -> None:
             nonlocal placed
@@ -162,8 +176,9 @@ class Engine:
         viscosity: float = 0.0,
         watch: Callable[[int], None] = lambda step: None,
     ) -> None:
-        """Advance by n steps without moving the body, grains slowed by -viscosity v, kg/s. watch: called every `WATCH` steps
-        with the number of steps since the bed was made."""
+        """Advance by n steps without moving the body, grains slowed by -viscosity v,
+        kg/s. watch: called every `WATCH` steps with the number of steps since the bed
+        was made."""
         if viscosity:
             self._commands(f"fix slow grains viscous {viscosity:.17g}")
         self._run(n, WATCH, lambda step, *_: watch(step))
@@ -171,7 +186,8 @@ class Engine:
             self._commands("unfix slow")
 
     def _run(self, n: int, every: int, function: Callable[..., None]) -> None:
-        """Advance by n steps and call function(step, n_local, tag, x) every so many steps, once they are done."""
+        """Advance by n steps and call function(step, n_local, tag, x) every so many
+        steps, once they are done."""
         error: BaseException | None = None
         stop = lambda: self.lmp.lib.lammps_force_timeout(self.lmp.lmp)
 
@@ -183,7 +199,8 @@ class Engine:
             x: np.ndarray,
             external: np.ndarray,
         ) -> None:
-            # LAMMPS prints what a callback raises and goes on: the error is kept, the run is stopped, and it is raised after.
+            # LAMMPS prints what a callback raises and goes on: the error is kept, the
+            # run is stopped, and it is raised after.
             nonlocal error
             if error is None:
                 try:
@@ -237,8 +254,9 @@ class Engine:
 
 @contextlib.contextmanager
 def deferring(stop: Callable[[], object]) -> Iterator[None]:
-    """Call stop() when a signal comes, and hand it on at the end. What a handler of Python raises meanwhile would be lost in
-    the callback that LAMMPS is in, with the step that it interrupts."""
+    """Call stop() when a signal comes, and hand it on at the end. What a handler of
+    Python raises meanwhile would be lost in the callback that LAMMPS is in, with the
+    step that it interrupts."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -282,9 +300,12 @@ def refusing() -> Iterator[None]:
 
 
 def write_data(path: Path, bed: Bed, body: np.ndarray, radius: np.ndarray) -> None:
-    """Write a data file of grains on a lattice around the spheres of a body, centres (n, 3), m, and radii (n,), m."""
+    """Write a data file of grains on a lattice around the spheres of a body, centres
+    (n, 3), m, and radii (n,), m."""
     centres, diameters = bed.lattice(body, radius)
-    n, x, y = len(centres), bed.length / 2, bed.width / 2
+    n = len(centres)
+    x = bed.length / 2
+    y = bed.width / 2
     top = centres[:, 2].max() + max(bed.depth, 8 * bed.diameter)
     lines = [
         "grains and a body", "", f"{n + len(body)} atoms", "2 atom types", f"{-x:.17g} {x:.17g} xlo xhi",

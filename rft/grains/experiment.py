@@ -1,6 +1,8 @@
-"""Experiments: a body that moves in a settled bed, computed in blocks between files, so that a stopped one goes on.
+"""Experiments: a body that moves in a settled bed, computed in blocks between files, so
+that a stopped one goes on.
 
-Every block begins from a restart file, in a run that nobody stops as well: a resumed run has the same digits."""
+Every block begins from a restart file, in a run that nobody stops as well: a resumed
+run has the same digits."""
 
 from __future__ import annotations
 
@@ -28,10 +30,12 @@ from rft.grains.spheres import Spheres
 
 try:
     import fcntl
-except ImportError:  # no such locks on Windows, where a run in one folder by two processes is not refused
+# no such locks on Windows, where a run in one folder by two processes is not refused
+except ImportError:
     fcntl = None  # type: ignore[assignment]
 
-FORMAT = 2  # of the files and of all constants that digits depend on; another number begins anew
+# of the files and of all constants that digits depend on; another number begins anew
+FORMAT = 2
 BLOCK = 2000  # steps between restart files: some 15 s of a bed of 15,000 grains
 FREE = 2.0  # grain diameters that must lie below a body and beside it
 COVER = 1.0  # grain diameters that must lie above it
@@ -40,12 +44,13 @@ FASTEST = (
 )
 SETTLING = 0.4, 0.3  # s of falling in a viscous air, and of rest without it
 SLOWING = 0.6  # s in which the viscous air slows a grain down
-CALM = 1e-3  # kinetic energy of a settled grain, on average, over its weight times its diameter
+# kinetic energy of a settled grain, on average, over its weight times its diameter
+CALM = 1e-3
 LONGEST = 5.0  # s of settling
 Progress = Callable[[float], None]
-Block = dict[
-    str, np.ndarray
-]  # the series of a run over a block, its state and time, and the digest of the file after it
+# the series of a run over a block, its state and time, and the digest of the file after
+# it
+Block = dict[str, np.ndarray]
 
 
 def _silent(fraction: float) -> None: ...
@@ -54,13 +59,16 @@ def _silent(fraction: float) -> None: ...
 class Run(NamedTuple):
     """What happened to a body, over n samples in time.
 
-    t: (n,), end of each sample, s. force: (n, 3), mean force of the grains on the body, N. moment: (n,), about its centre of
-    mass, N m. profile: (n, spheres, 3), force on each sphere, N. along: (spheres,), where it is on the body (`Spheres.along`),
-    m. pose: (n, 3), x and y, m, and heading, rad, of its frame, at t. centre: (n, 2), of mass, m. alpha: (n, joints), rad.
-    work: (n,), of the body on the grains so far, J. kinetic: (n,), energy of the body, J. energy: (blocks + 1, 2), of the
-    grains, J, at the start and after each block: kinetic with gravity, and elastic. overlaps: (blocks + 1, 2), largest and
-    mean, in grain diameters. facts: grains, spheres, packing, surface (m, over the floor), time_step (s), steps, mass (kg),
-    processor seconds, and the version of LAMMPS.
+    t: (n,), end of each sample, s. force: (n, 3), mean force of the grains on the body,
+    N. moment: (n,), about its centre of mass, N m. profile: (n, spheres, 3), force on
+    each sphere, N. along: (spheres,), where it is on the body (`Spheres.along`), m.
+    pose: (n, 3), x and y, m, and heading, rad, of its frame, at t. centre: (n, 2), of
+    mass, m. alpha: (n, joints), rad. work: (n,), of the body on the grains so far, J.
+    kinetic: (n,), energy of the body, J. energy: (blocks + 1, 2), of the grains, J, at
+    the start and after each block: kinetic with gravity, and elastic. overlaps:
+    (blocks + 1, 2), largest and mean, in grain diameters. facts: grains, spheres,
+    packing, surface (m, over the floor), time_step (s), steps, mass (kg), processor
+    seconds, and the version of LAMMPS.
 
     Examples
     --------
@@ -103,12 +111,13 @@ SERIES = (
 class Experiment:
     """A body that moves in a bed.
 
-    bed, body, motion: what they are. duration (s). depth (m): of the body's axis below the surface, half of the bed's if
-    None. sample (s): over which forces are averaged.
+    bed, body, motion: what they are. duration (s). depth (m): of the body's axis below
+    the surface, half of the bed's if None. sample (s): over which forces are averaged.
 
-    `run` computes it, in a folder of the caller's. There the settled bed is kept, under a name by its content, for all
-    motions of the body, and the run, block by block. The same experiment computed again is read from there; on one
-    processor core it has the same digits.
+    `run` computes it, in a folder of the caller's. There the settled bed is kept, under
+    a name by its content, for all motions of the body, and the run, block by block. The
+    same experiment computed again is read from there; on one processor core it has the
+    same digits.
 
     Examples
     --------
@@ -147,7 +156,8 @@ class Experiment:
 
     @property
     def grain_steps(self) -> float:
-        """Grains times steps, which the cost is proportional to; the settling of the bed is not counted."""
+        """Grains times steps, which the cost is proportional to; the settling of the
+        bed is not counted."""
         return float(self.n_steps) * (self.bed.grains + len(self.body.radius))
 
     def steps_left(self, folder: str | Path) -> int:
@@ -163,13 +173,16 @@ class Experiment:
         ).exists()
 
     def check(self) -> None:
-        """Raise ValueError, one line, for a body that does not fit its bed, or a motion that it cannot do."""
-        bed, body = self.bed, self.body
+        """Raise ValueError, one line, for a body that does not fit its bed, or a motion
+        that it cannot do."""
+        bed = self.bed
+        body = self.body
         if self.depth is not None:
             in_range("depth", self.depth, 0, bed.depth, unit="m")
         in_range("duration", self.duration, bed.step, 1e6, unit="s")
         in_range("sample", self.sample, 1e-9, self.duration, unit="s")
-        below, above = self.height + body.bottom, bed.depth - self.height - body.top
+        below = self.height + body.bottom
+        above = bed.depth - self.height - body.top
         require(
             below >= FREE * bed.diameter and above >= COVER * bed.diameter,
             f"the bed is too shallow: {1e3 * below:.1f} mm below the body and {1e3 * above:.1f} mm above",
@@ -205,9 +218,10 @@ class Experiment:
     ) -> Run:
         """Return the run, computed in a folder as far as it is not there.
 
-        progress: called with the fraction done, of all time steps. film (s): between frames of text files there,
-        ``frames-*.lammpstrj``, which OVITO opens as one; only of blocks that are computed now. Raises ValueError if grains
-        fly off or the body leaves the bed: blocks that are done stay."""
+        progress: called with the fraction done, of all time steps. film (s): between
+        frames of text files there, ``frames-*.lammpstrj``, which OVITO opens as one;
+        only of blocks that are computed now. Raises ValueError if grains fly off or the
+        body leaves the bed: blocks that are done stay."""
         self.check()
         if film is not None:
             in_range("film", film, 1e-9, 1e6, unit="s")
@@ -220,16 +234,15 @@ class Experiment:
         settled = settle(
             self.bed, self.body, self.height, folder, lambda done: report(share * done)
         )
-        place, lengths = folder / f"run-{self._key()}", self._blocks()
+        place = folder / f"run-{self._key()}"
+        lengths = self._blocks()
         place.mkdir(parents=True, exist_ok=True)
         blocks = _blocks_done(place, len(lengths))
         if len(blocks) < len(lengths):
             with _locked(place):
                 for k in range(len(blocks), len(lengths)):
-                    start, step = (
-                        (_state_file(place, k) if k else settled.file),
-                        sum(lengths[:k]),
-                    )
+                    start = _state_file(place, k) if k else settled.file
+                    step = sum(lengths[:k])
                     before = blocks[-1] if k else None
                     tell = lambda done: report(share + (1 - share) * done)
                     blocks.append(
@@ -267,24 +280,27 @@ class Experiment:
 
 
 class _Block:
-    """One block of an experiment under way: what LAMMPS calls every step, and the samples of it."""
+    """One block of an experiment under way: what LAMMPS calls every step, and the
+    samples of it."""
 
     def __init__(
         self, experiment: Experiment, bulk: float, place: Path, index: int, step: int, before: Block | None,
         progress: Progress,
     ):  # fmt: skip
-        self.experiment, self.place, self.index, self.progress = (
-            experiment,
-            place,
-            index,
-            progress,
-        )
-        self.step, self.dt, self.n = step, experiment.bed.step, experiment.sample_steps
+        self.experiment = experiment
+        self.place = place
+        self.index = index
+        self.progress = progress
+        self.step = step
+        self.dt = experiment.bed.step
+        self.n = experiment.sample_steps
         self.mass = experiment.body.mass(bulk)
         self.rows: dict[str, list] = {name: [] for name in SERIES}
-        self.state, self.work = experiment.motion.start(), 0.0
+        self.state = experiment.motion.start()
+        self.work = 0.0
         if before:
-            self.state, self.work = before["state"], float(before["work"][-1])
+            self.state = before["state"]
+            self.work = float(before["work"][-1])
         self.now = self._move(0.0)
         self._clear()
 
@@ -299,8 +315,10 @@ class _Block:
         self.sums = np.zeros(3), 0.0, np.zeros((len(self.experiment.body.radius), 3))
 
     def compute(self, start: Path, steps: int, film: float | None) -> Block:
-        """Compute the block, write its rows and the state after it, and return the rows."""
-        e, clock = self.experiment, time.process_time()
+        """Compute the block, write its rows and the state after it, and return the
+        rows."""
+        e = self.experiment
+        clock = time.process_time()
         with Engine(e.bed, start, len(e.body.radius), restart=True) as engine:
             if not self.index:
                 self._weigh(engine)
@@ -335,13 +353,12 @@ class _Block:
     def _place(self, forces: Forces) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Take up the forces of a step and return the body of the next."""
         on, twist = forces
-        was, p = self.now, self.now.placement
+        was = self.now
+        p = self.now.placement
         arm = p.centres[:, :2] - [was.centre.real, was.centre.imag]
-        force, moment = (
-            on.sum(0),
-            float(
-                (arm[:, 0] * on[:, 1] - arm[:, 1] * on[:, 0]).sum() + twist[:, 2].sum()
-            ),
+        force = on.sum(0)
+        moment = float(
+            (arm[:, 0] * on[:, 1] - arm[:, 1] * on[:, 0]).sum() + twist[:, 2].sum()
         )
         require(
             bool(np.isfinite(force).all()),
@@ -361,7 +378,8 @@ class _Block:
         return self.now.placement
 
     def _check(self, before: np.ndarray) -> None:
-        bed, centres = self.experiment.bed, self.now.placement.centres
+        bed = self.experiment.bed
+        centres = self.now.placement.centres
         far = np.abs(centres - before).max()
         require(
             bool(far <= FASTEST * bed.diameter),
@@ -403,8 +421,8 @@ class _Block:
 
 
 class Settled(NamedTuple):
-    """A bed at rest around a body. file: a restart file of LAMMPS. facts: numbers of it. bulk: density of the packed grains,
-    kg/m^3."""
+    """A bed at rest around a body. file: a restart file of LAMMPS. facts: numbers of
+    it. bulk: density of the packed grains, kg/m^3."""
 
     file: Path
     facts: dict[str, float]
@@ -418,8 +436,9 @@ def settle(
     folder: str | Path,
     progress: Progress = lambda fraction: None,
 ) -> Settled:
-    """Return the bed at rest around a straight body whose axis is at a height (m) over the floor, from the folder where it is
-    there, else computed and kept there. progress: called with the fraction done."""
+    """Return the bed at rest around a straight body whose axis is at a height (m) over
+    the floor, from the folder where it is there, else computed and kept there.
+    progress: called with the fraction done."""
     folder = Path(folder).resolve()
     plain = str(folder).isascii() and '"' not in str(folder)
     require(
@@ -443,7 +462,8 @@ def settle(
     if sheet.exists():
         with contextlib.suppress(OSError):
             os.replace(file, file.with_suffix(".damaged"))
-    clock, zero = time.process_time(), np.zeros(body.joints)
+    clock = time.process_time()
+    zero = np.zeros(body.joints)
     links = body.links(zero, zero)
     middle = body.half_lengths @ links.centres / body.half_lengths.sum()
     centres = body.placed(links, -middle, 0.0, 0.0, 0.0, height).centres
@@ -515,14 +535,14 @@ def _settle(
         )
         engine.settle(resting, watch=watch)
     p = engine.particles()
-    z, volume = p.x[~p.body, 2], 4 / 3 * np.pi * p.radius[~p.body] ** 3
+    z = p.x[~p.body, 2]
+    volume = 4 / 3 * np.pi * p.radius[~p.body] ** 3
     surface = float(np.quantile(z, 0.98)) + bed.diameter / 2
-    # Beside the body, and two grains from floor and surface; a grain counts where its centre lies.
-    low, high, margin = (
-        2 * bed.diameter,
-        surface - 2 * bed.diameter,
-        body.half_width + bed.diameter,
-    )
+    # Beside the body, and two grains from floor and surface; a grain counts where its
+    # centre lies.
+    low = 2 * bed.diameter
+    high = surface - 2 * bed.diameter
+    margin = body.half_width + bed.diameter
     inside = (z > low) & (z < high) & (np.abs(p.x[~p.body, 1]) > margin)
     packing = float(
         volume[inside].sum() / (bed.length * (bed.width - 2 * margin) * (high - low))
@@ -582,7 +602,8 @@ def _rows(place: Path, block: int) -> Block:
 
 
 def _blocks_done(place: Path, n: int) -> list[Block]:
-    """Return the blocks whose rows are there and whole, with the state to go on from, or all n of them."""
+    """Return the blocks whose rows are there and whole, with the state to go on from,
+    or all n of them."""
     blocks: list[Block] = []
     while len(blocks) < n and (rows := _rows(place, len(blocks))):
         blocks.append(rows)
@@ -600,7 +621,8 @@ def _remove(paths: Any) -> None:
 
 @contextlib.contextmanager
 def _replacing(path: Path) -> Iterator[Path]:
-    """Yield a name to write to; the file takes the place of ``path`` once it is whole."""
+    """Yield a name to write to; the file takes the place of ``path`` once it is
+    whole."""
     part = path.with_name(f"{path.name}.{os.getpid()}.part")
     try:
         yield part

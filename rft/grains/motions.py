@@ -1,7 +1,8 @@
-"""Motions of a body in a bed: towed, to and fro, and free in the plane with prescribed joints.
+"""Motions of a body in a bed: towed, to and fro, and free in the plane with prescribed
+joints.
 
-A motion is a state, numbers that a stopped run keeps, and two functions of it: the next state under the force of the
-grains, and the placement of the body."""
+A motion is a state, numbers that a stopped run keeps, and two functions of it: the next
+state under the force of the grains, and the placement of the body."""
 
 from __future__ import annotations
 
@@ -15,12 +16,14 @@ from rft.core.checks import Number, check_numbers
 from rft.core.refusal import require
 from rft.grains.spheres import Placement, Spheres
 
-SAMPLES = 256  # shapes of a cycle that name a swim and are looked through for links that touch
+# shapes of a cycle that name a swim and are looked through for links that touch
+SAMPLES = 256
 
 
 class Moved(NamedTuple):
-    """A body at a time. placement: of its spheres. pose: (3,), x and y of its frame, m, and heading, rad. centre: of mass,
-    m, x + i y, about which moments are taken. alpha: joint angles, rad. kinetic: energy of the body, J."""
+    """A body at a time. placement: of its spheres. pose: (3,), x and y of its frame, m,
+    and heading, rad. centre: of mass, m, x + i y, about which moments are taken. alpha:
+    joint angles, rad. kinetic: energy of the body, J."""
 
     placement: Placement
     pose: np.ndarray
@@ -30,7 +33,8 @@ class Moved(NamedTuple):
 
 
 class Motion(Protocol):
-    """A motion of a body. `named` returns all data that it consists of, `check` refuses what it cannot do."""
+    """A motion of a body. `named` returns all data that it consists of, `check` refuses
+    what it cannot do."""
 
     def named(self) -> tuple: ...
 
@@ -42,7 +46,8 @@ class Motion(Protocol):
     def push(
         self, state: np.ndarray, force: np.ndarray, moment: float, dt: float
     ) -> np.ndarray:
-        """Return the state with the momentum that a force (3,), N, and a moment about z, N m, add in dt (s)."""
+        """Return the state with the momentum that a force (3,), N, and a moment about
+        z, N m, add in dt (s)."""
 
     def move(
         self,
@@ -53,13 +58,14 @@ class Motion(Protocol):
         mass: float,
         height: float,
     ) -> tuple[np.ndarray, Moved]:
-        """Return the state at t (s), which is dt later, and the body there. mass: kg. height: of the axis, m."""
+        """Return the state at t (s), which is dt later, and the body there. mass: kg.
+        height: of the axis, m."""
 
 
 @dataclass(frozen=True)
 class Tow:
-    """A rigid body, or a straight chain, at constant velocity. speed (m/s). angle (rad): of the velocity from the body's
-    axis, which lies along x.
+    """A rigid body, or a straight chain, at constant velocity. speed (m/s). angle
+    (rad): of the velocity from the body's axis, which lies along x.
 
     Examples
     --------
@@ -98,9 +104,11 @@ class Tow:
         mass: float,
         height: float,
     ) -> tuple[np.ndarray, Moved]:
-        zero, direction = np.zeros(body.joints), np.exp(1j * self.angle)
+        zero = np.zeros(body.joints)
+        direction = np.exp(1j * self.angle)
         distance, speed = self.path(t)
-        links, place = body.links(zero, zero), distance * direction
+        links = body.links(zero, zero)
+        place = distance * direction
         origin = place - body.half_lengths @ links.centres / body.half_lengths.sum()
         placement = body.placed(links, origin, 0.0, speed * direction, 0.0, height)
         return state, Moved(
@@ -114,7 +122,8 @@ class Tow:
 
 @dataclass(frozen=True)
 class Stroke(Tow):
-    """A rigid body to and fro at constant speed: from the middle to amplitude (m), then to -amplitude, and so on.
+    """A rigid body to and fro at constant speed: from the middle to amplitude (m), then
+    to -amplitude, and so on.
 
     Examples
     --------
@@ -138,11 +147,12 @@ class Stroke(Tow):
 class Swim:
     """A body free in the plane with prescribed joint angles; its height is held.
 
-    shape: function of the phase (rad) that returns joint angles (joints,), rad, of period 2 pi. rate: its derivative.
-    frequency (Hz). ramp (s): the shape grows smoothly from the straight body during it. phase (rad): at t = 0.
+    shape: function of the phase (rad) that returns joint angles (joints,), rad, of
+    period 2 pi. rate: its derivative. frequency (Hz). ramp (s): the shape grows
+    smoothly from the straight body during it. phase (rad): at t = 0.
 
-    Momentum and moment of momentum follow from force and moment of the grains by Euler's method, momentum first. The mass
-    of a link is its share of the length.
+    Momentum and moment of momentum follow from force and moment of the grains by
+    Euler's method, momentum first. The mass of a link is its share of the length.
 
     Examples
     --------
@@ -186,14 +196,16 @@ class Swim:
         """Return joint angles, rad, and their rates, rad/s, at t (s)."""
         w = 2 * np.pi * self.frequency
         q = min(t / self.ramp, 1.0)
-        grown, growing = q * q * (3 - 2 * q), 6 * q * (1 - q) / self.ramp
+        grown = q * q * (3 - 2 * q)
+        growing = 6 * q * (1 - q) / self.ramp
         alpha, slope = (
             np.asarray(f(w * t + self.phase), float) for f in (self.shape, self.rate)
         )
         return grown * alpha, grown * w * slope + growing * alpha
 
     def start(self) -> np.ndarray:
-        # x, y of the centre of mass, heading of the frame, momentum x and y, moment of momentum about the centre.
+        # x, y of the centre of mass, heading of the frame, momentum x and y, moment of
+        # momentum about the centre.
         return np.zeros(6)
 
     def push(
@@ -216,17 +228,23 @@ class Swim:
         bars = (
             m * body.half_lengths**2 / 3
         )  # moments of inertia of thin links about their centres
-        centre, drift = m @ links.centres / mass, m @ links.velocities / mass
-        lever, inner = links.centres - centre, links.velocities - drift
+        centre = m @ links.centres / mass
+        drift = m @ links.velocities / mass
+        lever = links.centres - centre
+        inner = links.velocities - drift
         inertia = m @ np.abs(lever) ** 2 + bars.sum()
         spin = m @ (lever.conj() * inner).imag + bars @ links.rates
         x, y, theta, px, py, L = state
-        v, rate = complex(px, py) / mass, (L - spin) / inertia
-        place, theta = complex(x, y) + dt * v, theta + dt * rate
+        v = complex(px, py) / mass
+        rate = (L - spin) / inertia
+        place = complex(x, y) + dt * v
+        theta = theta + dt * rate
         turn = np.exp(1j * theta)
-        origin, speed = place - turn * centre, v - turn * (drift + 1j * rate * centre)
+        origin = place - turn * centre
+        speed = v - turn * (drift + 1j * rate * centre)
         placement = body.placed(links, origin, theta, speed, rate, height)
-        rates, link_v = rate + links.rates, v + turn * (inner + 1j * rate * lever)
+        rates = rate + links.rates
+        link_v = v + turn * (inner + 1j * rate * lever)
         kinetic = (m @ np.abs(link_v) ** 2 + bars @ rates**2) / 2
         moved = Moved(
             placement,

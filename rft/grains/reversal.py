@@ -18,8 +18,8 @@ from rft.grains.motions import Stroke
 class Drags(NamedTuple):
     """Drag on a rod that goes to and fro, against its motion, in bins of its way.
 
-    amplitude (m). travel: (n,), way so far at the middle of each bin, m. flank, ends: (n,), of the flank and of both ends
-    together, N."""
+    amplitude (m). travel: (n,), way so far at the middle of each bin, m. flank, ends:
+    (n,), of the flank and of both ends together, N."""
 
     amplitude: float
     travel: np.ndarray
@@ -28,10 +28,11 @@ class Drags(NamedTuple):
 
 
 class Recovery(NamedTuple):
-    """Drag = plateau (at_once + (1 - at_once) (1 + m) / 2) with the mean direction m of `rft.effects.Transient`.
+    """Drag = plateau (at_once + (1 - at_once) (1 + m) / 2) with the mean direction m of
+    `rft.effects.Transient`.
 
-    plateau: drag after a long way, N. at_once: share of it. travel: m. start: m in the fresh bed. rms: of the bins about the
-    fit, over the plateau."""
+    plateau: drag after a long way, N. at_once: share of it. travel: m. start: m in the
+    fresh bed. rms: of the bins about the fit, over the plateau."""
 
     plateau: float
     at_once: float
@@ -40,7 +41,8 @@ class Recovery(NamedTuple):
     rms: float
 
     def drag(self, travel: np.ndarray, amplitude: float) -> np.ndarray:
-        """Return the drag, N, at ways so far (n,), m, of a rod to and fro with an amplitude, m."""
+        """Return the drag, N, at ways so far (n,), m, of a rod to and fro with an
+        amplitude, m."""
         m = mean_direction(travel, amplitude, self.travel, self.start)
         return self.plateau * (self.at_once + (1 - self.at_once) * (1 + m) / 2)
 
@@ -48,13 +50,15 @@ class Recovery(NamedTuple):
 def mean_direction(
     way: np.ndarray, amplitude: float, travel: float, start: float
 ) -> np.ndarray:
-    """Return the mean direction of travel, 1 for the present one, at ways so far (n,) of a rod that turns round at an
-    amplitude and then at every second one, from ``start``; lengths in one unit."""
+    """Return the mean direction of travel, 1 for the present one, at ways so far (n,)
+    of a rod that turns round at an amplitude and then at every second one, from
+    ``start``; lengths in one unit."""
     length = travel / E_FOLDINGS
     stretch = np.maximum(np.ceil((way / amplitude - 1) / 2), 0).astype(int)
     out = np.empty_like(way)
     for k in range(stretch.max() + 1):
-        begin, end = max(0, 2 * k - 1) * amplitude, (2 * k + 1) * amplitude
+        begin = max(0, 2 * k - 1) * amplitude
+        end = (2 * k + 1) * amplitude
         mine = stretch == k
         out[mine] = 1 - (1 - start) * np.exp(-(way[mine] - begin) / length)
         start = -(1 - (1 - start) * np.exp(-(end - begin) / length))
@@ -62,15 +66,14 @@ def mean_direction(
 
 
 def drags(run: Run, stroke: Stroke, half_width: float, bin_width: float) -> Drags:
-    """Return the drag on a round rod along x that went to and fro, in bins (m) of its way that divide its amplitude.
+    """Return the drag on a round rod along x that went to and fro, in bins (m) of its
+    way that divide its amplitude.
 
-    half_width (m): of the rod, whose ends reach `END` of them as in `rft.grains.drag.flank_and_ends`. Samples in which
-    it turns are left out."""
-    a, way, sample = (
-        stroke.amplitude,
-        stroke.speed * run.t,
-        stroke.speed * (run.t[1] - run.t[0]),
-    )
+    half_width (m): of the rod, whose ends reach `END` of them as in
+    `rft.grains.drag.flank_and_ends`. Samples in which it turns are left out."""
+    a = stroke.amplitude
+    way = stroke.speed * run.t
+    sample = stroke.speed * (run.t[1] - run.t[0])
     require(way[-1] > a, "the body has not turned round", instead="take a longer run")
     turned = np.maximum(np.ceil((way / a - 1) / 2), 0)
     whole = turned == np.maximum(np.ceil(((way - sample) / a - 1) / 2), 0)
@@ -89,7 +92,8 @@ def drags(run: Run, stroke: Stroke, half_width: float, bin_width: float) -> Drag
 
 
 def recovery(cases: Sequence[tuple[float, np.ndarray, np.ndarray]]) -> Recovery:
-    """Return the recovery that fits drags on one rod, (amplitude, travel (n,), drag (n,)) of each run, all runs alike."""
+    """Return the recovery that fits drags on one rod, (amplitude, travel (n,), drag
+    (n,)) of each run, all runs alike."""
     from scipy.optimize import least_squares
 
     scale = float(np.mean([drag.mean() for _, _, drag in cases]))
@@ -105,7 +109,8 @@ def recovery(cases: Sequence[tuple[float, np.ndarray, np.ndarray]]) -> Recovery:
         )
 
     first = [scale, 0.2, longest / 5, 0.2]
-    low, high = [0.0, -1.0, longest / 1e3, -1.0], [9 * scale, 1.0, longest, 2.0]
+    low = [0.0, -1.0, longest / 1e3, -1.0]
+    high = [9 * scale, 1.0, longest, 2.0]
     found = least_squares(misfit, first, bounds=(low, high), x_scale=first)
     plateau, *others = found.x.tolist()
     return Recovery(

@@ -12,7 +12,9 @@ from rft.bodies.base import Elements
 from rft.core.checks import in_range
 from rft.core.refusal import Refusal, require
 
-SPACING = 0.25  # of neighbouring spheres, in radii: between them the surface dips by 1 - sqrt(1 - 1/64) = 0.8 % of one
+# of neighbouring spheres, in radii: between them the surface dips by 1 - sqrt(1 - 1/64)
+# = 0.8 % of one
+SPACING = 0.25
 MOST_SPHERES = 1e5  # of a bar or plate: more take minutes to place
 SHAPES = "round", "half round", "half round, flat up", "square"
 
@@ -20,7 +22,8 @@ SHAPES = "round", "half round", "half round, flat up", "square"
 class Bar:
     """The skeleton of one rigid link, as a body without joints."""
 
-    joints, length = 0, 1.0
+    joints = 0
+    length = 1.0
 
     def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Elements:
         zero = np.zeros((1, alpha.shape[1]), complex)
@@ -30,7 +33,8 @@ class Bar:
 
 
 class Placement(NamedTuple):
-    """Spheres of a body in the world: centres (n, 3), m, velocities (n, 3), m/s, rates of turning about z (n,), rad/s."""
+    """Spheres of a body in the world: centres (n, 3), m, velocities (n, 3), m/s, rates
+    of turning about z (n,), rad/s."""
 
     centres: np.ndarray
     velocities: np.ndarray
@@ -38,8 +42,8 @@ class Placement(NamedTuple):
 
 
 class Skeleton(NamedTuple):
-    """Links in the body frame, held, (n,): exp(i heading), rates, rad/s, centres, m, and their velocities, m/s, as complex
-    numbers."""
+    """Links in the body frame, held, (n,): exp(i heading), rates, rad/s, centres, m,
+    and their velocities, m/s, as complex numbers."""
 
     heading: np.ndarray
     rates: np.ndarray
@@ -51,11 +55,12 @@ class Skeleton(NamedTuple):
 class Spheres:
     """A body of spheres on rigid links, in a plane of constant height.
 
-    skeleton: body of `rft.bodies`, or `Bar`, whose shapes are its joint angles. size (m): its length. link: (n,), index of
-    each sphere's link. at: (n, 3), m, centre of each sphere in its link's frame: along it from its middle, to its left,
-    upwards. radius: (n,), m. half_width (m): largest distance of the surface from the links' axes. density (kg/m^3): mass
-    over the volume pi half_width^2 length of the links; as the packed grains' if None. through: a bar that spans a periodic
-    bed along x.
+    skeleton: body of `rft.bodies`, or `Bar`, whose shapes are its joint angles. size
+    (m): its length. link: (n,), index of each sphere's link. at: (n, 3), m, centre of
+    each sphere in its link's frame: along it from its middle, to its left, upwards.
+    radius: (n,), m. half_width (m): largest distance of the surface from the links'
+    axes. density (kg/m^3): mass over the volume pi half_width^2 length of the links; as
+    the packed grains' if None. through: a bar that spans a periodic bed along x.
 
     Examples
     --------
@@ -87,7 +92,8 @@ class Spheres:
 
     @property
     def along(self) -> np.ndarray:
-        """Distance of each sphere from the middle of the body along its links, tail to head, (n,), m."""
+        """Distance of each sphere from the middle of the body along its links, tail to
+        head, (n,), m."""
         half = self.half_lengths
         starts = np.concatenate([[0.0], np.cumsum(2 * half)[:-1]]) - half.sum()
         return starts[self.link] + half[self.link] + self.at[:, 0]
@@ -115,11 +121,13 @@ class Spheres:
         return float((self.at[:, 2] + self.radius).max())
 
     def mass(self, bulk: float) -> float:
-        """Return the mass, kg. bulk: density of the packed grains, kg/m^3, of a body without its own."""
+        """Return the mass, kg. bulk: density of the packed grains, kg/m^3, of a body
+        without its own."""
         return (self.density or bulk) * math.pi * self.half_width**2 * self.size
 
     def links(self, alpha: np.ndarray, alphadot: np.ndarray) -> Skeleton:
-        """Return the links in the body frame at joint angles (joints,), rad, and rates, rad/s."""
+        """Return the links in the body frame at joint angles (joints,), rad, and rates,
+        rad/s."""
         e = self.skeleton.motion(
             np.reshape(alpha, (-1, 1)), np.reshape(alphadot, (-1, 1))
         )
@@ -139,8 +147,9 @@ class Spheres:
         rate: float,
         height: float,
     ) -> Placement:
-        """Return the spheres of links whose frame is at x (m), heading theta (rad), and moves at v (m/s), turning at ``rate``
-        (rad/s); all in the world. height: of the axis, m."""
+        """Return the spheres of links whose frame is at x (m), heading theta (rad), and
+        moves at v (m/s), turning at ``rate`` (rad/s); all in the world. height: of the
+        axis, m."""
         turn = np.exp(1j * theta)
         lever = links.heading[self.link] * (self.at[:, 0] + 1j * self.at[:, 1])
         p = turn * (links.centres[self.link] + lever)
@@ -153,8 +162,10 @@ class Spheres:
         return Placement(centres, velocities, rate + links.rates[self.link])
 
     def check_apart(self, shapes: np.ndarray) -> None:
-        """Raise ValueError if links touch, other than neighbours at their joint, at one of the shapes (B, joints), rad."""
-        along, zero = self.along, np.zeros(self.joints)
+        """Raise ValueError if links touch, other than neighbours at their joint, at one
+        of the shapes (B, joints), rad."""
+        along = self.along
+        zero = np.zeros(self.joints)
         far = np.abs(along[:, None] - along) > 8 * self.half_width
         reach = self.radius[:, None] + self.radius
         for alpha in shapes:
@@ -174,8 +185,9 @@ def chain(
 ) -> Spheres:
     """Return a body of straight round links with round ends.
 
-    skeleton: body of straight links such as `rft.Chain`. size (m): its length from end to end. radius (m): of the links;
-    the spheres at both ends are its caps. density (kg/m^3): as for `Spheres`.
+    skeleton: body of straight links such as `rft.Chain`. size (m): its length from end
+    to end. radius (m): of the links; the spheres at both ends are its caps. density
+    (kg/m^3): as for `Spheres`.
 
     Examples
     --------
@@ -194,11 +206,14 @@ def chain(
         "links must be longer than their width",
         value=(2 * half).tolist(),
     )
-    links, along = [], []
+    links = []
+    along = []
     for k, h in enumerate(half):
-        low, high = -h + radius * (k == 0), h - radius * (k == len(half) - 1)
+        low = -h + radius * (k == 0)
+        high = h - radius * (k == len(half) - 1)
         n = max(2, math.ceil((high - low) / (SPACING * radius)))
-        # From joint to joint spheres stand at the middles of equal pieces; an end has its sphere at its very place.
+        # From joint to joint spheres stand at the middles of equal pieces; an end has
+        # its sphere at its very place.
         u = np.linspace(low, high, n + 1)
         at = np.concatenate(
             [
@@ -230,9 +245,11 @@ def rod(
 ) -> Spheres:
     """Return a rigid bar along x.
 
-    length (m): from end to end. radius (m): half its width. shape: one of `SHAPES`; "half round" lies on its flat side. A
-    round bar that ends in the bed has round ends. through: it spans a periodic bed of that length, as bars of other shapes
-    must. grain (m): radius of the spheres on the outline of a shape that is not round or spans the bed.
+    length (m): from end to end. radius (m): half its width. shape: one of `SHAPES`;
+    "half round" lies on its flat side. A round bar that ends in the bed has round ends.
+    through: it spans a periodic bed of that length, as bars of other shapes must. grain
+    (m): radius of the spheres on the outline of a shape that is not round or spans the
+    bed.
 
     Examples
     --------
@@ -273,9 +290,11 @@ def plate(
 ) -> Spheres:
     """Return a thin plate that spans a periodic bed along x.
 
-    length (m): of the bed. height (m): of the plate. tilt (rad): its turn about x; 0 is upright, and the face that looks
-    towards +y looks up where it is positive. grain (m): radius of its spheres. thickness (m): one layer of spheres if None;
-    else two, first those of the face that looks towards +y, then those of the other, so that the force on each is told.
+    length (m): of the bed. height (m): of the plate. tilt (rad): its turn about x; 0 is
+    upright, and the face that looks towards +y looks up where it is positive. grain
+    (m): radius of its spheres. thickness (m): one layer of spheres if None; else two,
+    first those of the face that looks towards +y, then those of the other, so that the
+    force on each is told.
 
     Examples
     --------
@@ -294,7 +313,8 @@ def plate(
     layers = (
         [0.0] if thickness is None else [thickness / 2 - grain, grain - thickness / 2]
     )
-    cos, sin = math.cos(tilt), math.sin(tilt)
+    cos = math.cos(tilt)
+    sin = math.sin(tilt)
     at = np.array(
         [
             (u, q * cos - w * sin, q * sin + w * cos)
@@ -315,8 +335,8 @@ def plate(
 
 
 def _check_sizes(grain: float | None = None, **sizes: float) -> None:
-    """Raise ValueError unless sizes, m, are some, and spheres of radius ``grain``, m, resolve the smallest and are not too
-    many."""
+    """Raise ValueError unless sizes, m, are some, and spheres of radius ``grain``, m,
+    resolve the smallest and are not too many."""
     for name, value in sizes.items():
         in_range(name, value, 1e-6, 1e3, unit="m")
     if grain is not None:
@@ -341,10 +361,12 @@ def _outline(shape: str, radius: float, grain: float) -> np.ndarray:
             (x, y) for x in (-q, q) for y in s[1:-1]
         ]
         return np.array(sides)
-    # Half a disc of that radius: the flat side a sphere's radius inside, the arc down to it.
+    # Half a disc of that radius: the flat side a sphere's radius inside, the arc down
+    # to it.
     least = math.asin(grain / q)
     angle = np.linspace(least, math.pi - least, math.ceil(math.pi * q / grain) + 1)
-    arc, half = q * np.column_stack([np.cos(angle), np.sin(angle)]), q * math.cos(least)
+    arc = q * np.column_stack([np.cos(angle), np.sin(angle)])
+    half = q * math.cos(least)
     y = np.linspace(-half, half, math.ceil(2 * half / grain) + 1)[1:-1]
     outline = np.concatenate([arc, np.column_stack([y, np.full(len(y), grain)])]) - [
         0.0,

@@ -1,4 +1,5 @@
-"""Steps in time in compiled code, one robot after the other. Importing this module loads numba."""
+"""Steps in time in compiled code, one robot after the other. Importing this module
+loads numba."""
 
 from __future__ import annotations
 
@@ -38,7 +39,8 @@ def added(a, b):
 
 @register_jitable(error_model="numpy")
 def on_robot(law, ground, disturbed, robot, pose, twist, angle, rate, sums):
-    """Return the `BodyLoad` on one robot: table, blocks, sides, legs and closed of its parts, and their hips (2, P)."""
+    """Return the `BodyLoad` on one robot: table, blocks, sides, legs and closed of its
+    parts, and their hips (2, P)."""
     table, blocks, side, leg, closed, hips = robot
     total = BodyLoad(0.0, 0.0, 0.0, 0.0, 0.0)
     strength, flux, rounding, grazing_sine, downhill_loss = ground
@@ -69,7 +71,8 @@ def difference(residual, changed, nudge):
 
 @register_jitable(error_model="numpy")
 def residual_of(law, ground, disturbed, robot, body, step, k, angle, rate, sums):
-    """Return the residual of a robot's stage at its trial, the residual's slopes, three columns, and the powers."""
+    """Return the residual of a robot's stage at its trial, the residual's slopes, three
+    columns, and the powers."""
     mass, inertia, reach = body
     nudge = difference_steps(ground[2], reach)
     residual = by_x = by_z = by_pitch = (0.0, 0.0, 0.0)
@@ -85,7 +88,8 @@ def residual_of(law, ground, disturbed, robot, body, step, k, angle, rate, sums)
         load = on_robot(law, ground, disturbed, robot, pose, v, angle, rate, sums)
         changed = stage_residual(load, v, step.stage.start, k, mass, inertia)
         if c == 0:
-            residual, power = changed, (load.motor_power, load.ground_power)
+            residual = changed
+            power = (load.motor_power, load.ground_power)
         elif c == 1:
             by_x = difference(residual, changed, nudge[0])
         elif c == 2:
@@ -100,13 +104,11 @@ def store(out, state):
     """Write an accepted state into a row (11,)."""
     out[0], out[1], out[2] = state.pose
     out[3], out[4], out[5] = state.twist
-    out[6], out[7], out[8], out[9], out[10] = (
-        state.work,
-        state.loss,
-        state.unsolved,
-        state.defect,
-        state.residual,
-    )
+    out[6] = state.work
+    out[7] = state.loss
+    out[8] = state.unsolved
+    out[9] = state.defect
+    out[10] = state.residual
 
 
 @functools.cache
@@ -130,7 +132,9 @@ def kernel(Law: type):
         states,
         tries,
     ):
-        law, sums, count = Law(*numbers), np.zeros((3, WIDTH)), len(lengths)
+        law = Law(*numbers)
+        sums = np.zeros((3, WIDTH))
+        count = len(lengths)
         (table, blocks, hips), (side, leg, closed), (angles, rates) = (
             elements,
             parts,
@@ -142,22 +146,20 @@ def kernel(Law: type):
             step = start_of_step(
                 (x[0], x[1], x[2]), (x[3], x[4], x[5]), x[6], x[7], x[8], x[9], x[10]
             )
-            robot, reach = (
-                (table, blocks[b], side, leg, closed, hips[:, b]),
-                bodies[b][2],
-            )
+            robot = (table, blocks[b], side, leg, closed, hips[:, b])
+            reach = bodies[b][2]
             strength, flux, rounding, grazing_sine, downhill_loss = grounds[b]
             s = 0
             while s < count:
-                rate, time = rates[s, b], stage_time(step.stage) * lengths[s, b]
+                rate = rates[s, b]
+                time = stage_time(step.stage) * lengths[s, b]
                 for j in range(len(angle)):
                     angle[j] = angles[s, b, j] + time * rate[j]
-                h, width, over = (
-                    step.stage.part * lengths[s, b],
-                    effort.widths[int(step.newton.width), 0],
-                    False,
-                )
-                k, tolerance = GAMMA * h, TOLERANCE * (rounding * width)
+                h = step.stage.part * lengths[s, b]
+                width = effort.widths[int(step.newton.width), 0]
+                over = False
+                k = GAMMA * h
+                tolerance = TOLERANCE * (rounding * width)
                 ground = (
                     strength,
                     flux,
@@ -199,9 +201,12 @@ def run_steps(
     ends,
     effort: Effort,
 ):
-    """Return (states, evaluations): the same as `rft.terradynamics.walking.march.run_steps_by_numpy`."""
-    elements, ground = robots.elements, robots.ground_under(index)
-    states, tries = np.empty((len(lengths), *start.shape)), np.zeros(len(start), int)
+    """Return (states, evaluations): the same as
+    `rft.terradynamics.walking.march.run_steps_by_numpy`."""
+    elements = robots.elements
+    ground = robots.ground_under(index)
+    states = np.empty((len(lengths), *start.shape))
+    tries = np.zeros(len(start), int)
     grounds = np.stack([np.broadcast_to(x, len(index)) for x in ground[:-1]], -1)
     bodies = np.stack(
         [robots.masses[index, 0], robots.masses[index, 2], robots.reach[index]], -1

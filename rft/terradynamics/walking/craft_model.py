@@ -1,4 +1,5 @@
-"""Craft on two screws as MuJoCo models: a box that moves freely, on screws that servos rotate.
+"""Craft on two screws as MuJoCo models: a box that moves freely, on screws that servos
+rotate.
 
 Screws have hardly any mass. Their servos are as stiff as those of legs
 (`rft.terradynamics.walking.hexapod`), so that angles are those of the clock.
@@ -31,13 +32,15 @@ DRAWN = 2000  # triangles of a screw as drawn
 
 
 def mjcf(robot: Screws) -> str:
-    """Return the model as XML: a body "hull", and "screw0" and "screw1" hinged to it, left and right, with position actuators
-    of the same names. At a positive rate a screw drives forwards."""
+    """Return the model as XML: a body "hull", and "screw0" and "screw1" hinged to it,
+    left and right, with position actuators of the same names. At a positive rate a
+    screw drives forwards."""
     root, hull = empty_model()
     ET.SubElement(hull, "freejoint")
     add_inertia(hull, robot.mass * (1 - 2 * LEG_MASS), robot.inertia)
     add_box(hull, [robot.length, robot.width, robot.height])
-    assets, motors = root.find("asset"), ET.SubElement(root, "actuator")
+    assets = root.find("asset")
+    motors = ET.SubElement(root, "actuator")
     stiffness = robot.mass * GRAVITY * robot.screw.radius / DEFLECTION
     for k, (screw, place) in enumerate(robot.screws):
         name = f"screw{k}"
@@ -58,7 +61,8 @@ def mjcf(robot: Screws) -> str:
 
 
 def surfaces(robot: Screws, elements: int) -> list[Surface]:
-    """Return the surfaces that touch the ground: the hull, body 1 of the model, and its screws."""
+    """Return the surfaces that touch the ground: the hull, body 1 of the model, and its
+    screws."""
     screws = [
         Surface.from_mesh(2 + k, mesh) for k, mesh in enumerate(robot.meshes(elements))
     ]

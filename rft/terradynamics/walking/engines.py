@@ -1,4 +1,5 @@
-"""Engines that compute walks, by name. An engine is one module with the functions of `Engine`, and a line in `ENGINES`."""
+"""Engines that compute walks, by name. An engine is one module with the functions of
+`Engine`, and a line in `ENGINES`."""
 
 from __future__ import annotations
 
@@ -18,8 +19,8 @@ from rft.terradynamics.walking.stride import Walk, compute_stride
 
 @dataclass(frozen=True)
 class Walker:
-    """A robot, its clock and its ground. stress: a stress map of the vertical plane, or a law of three dimensions. effects:
-    aeration and grain inertia.
+    """A robot, its clock and its ground. stress: a stress map of the vertical plane, or
+    a law of three dimensions. effects: aeration and grain inertia.
 
     Examples
     --------
@@ -43,10 +44,8 @@ class Walker:
             ("gait", Tripod),
             ("stress", PlateStress | Spatial),
         ):
-            value, kinds = (
-                getattr(self, name),
-                getattr(kind, "__name__", "PlateStress or Spatial"),
-            )
+            value = getattr(self, name)
+            kinds = getattr(kind, "__name__", "PlateStress or Spatial")
             require(isinstance(value, kind), f"{name} must be a {kinds}", value=value)
         object.__setattr__(self, "effects", checked_effects(self.effects))
         for effect in self.effects:
@@ -66,7 +65,8 @@ class Walker:
 class Fineness:
     """Numerical settings of a walk.
 
-    engine (-): planar or mujoco; by default planar, but mujoco for robots and ground of three dimensions.
+    engine (-): planar or mujoco; by default planar, but mujoco for robots and ground of
+    three dimensions.
 
     Examples
     --------
@@ -110,8 +110,9 @@ class Fineness:
 
 
 class Refined(NamedTuple):
-    """Numerics of which a walk tells how far it is off. setting: the one that differs, "steps" or "elements". factor: error
-    of the speed over its change, at least. cost: of the strides with them over that of a walk's."""
+    """Numerics of which a walk tells how far it is off. setting: the one that differs,
+    "steps" or "elements". factor: error of the speed over its change, at least. cost:
+    of the strides with them over that of a walk's."""
 
     numerics: Fineness
     setting: str
@@ -119,7 +120,8 @@ class Refined(NamedTuple):
     cost: float
 
 
-TO_COME = 1.5  # error over the change with twice the elements; up to 1.49 measured, 4/3 for order 2
+# error over the change with twice the elements; up to 1.49 measured, 4/3 for order 2
+TO_COME = 1.5
 
 
 def with_more_elements(numerics: Fineness, cost: float) -> Refined:
@@ -134,7 +136,8 @@ class Engine(Protocol):
     ORDER: int
 
     def refined(self, numerics: Fineness) -> list[Refined]:
-        """Return the numerics by which errors are estimated, at least one for each setting."""
+        """Return the numerics by which errors are estimated, at least one for each
+        setting."""
         ...
 
     def refuse(self, walker: Walker) -> None:
@@ -151,8 +154,9 @@ class Engine(Protocol):
     ) -> list[Walk]:
         """Return the walks of walkers from rest, with their speeds at the limit cycle.
 
-        A walk lasts ``cycles`` cycles, by default the duration of the numerics, or until the robot's end. progress:
-        receives the finished fraction. advance: computes a stride, as `rft.terradynamics.walking.stride.compute_stride`."""
+        A walk lasts ``cycles`` cycles, by default the duration of the numerics, or
+        until the robot's end. progress: receives the finished fraction. advance:
+        computes a stride, as `rft.terradynamics.walking.stride.compute_stride`."""
         ...
 
     def rerun(
@@ -163,20 +167,23 @@ class Engine(Protocol):
         cycles: int | None = None,
         advance: Callable = compute_stride,
     ) -> list[Walk]:
-        """Return known walks with other numerics. A walk with a limit cycle starts near it, and only the fields of the limit
-        cycle change; others are computed from rest."""
+        """Return known walks with other numerics. A walk with a limit cycle starts near
+        it, and only the fields of the limit cycle change; others are computed from
+        rest."""
         ...
 
     def step_cost(
         self, walkers: Sequence[Walker], numerics: Fineness, seconds: float
     ) -> tuple[float, float]:
-        """Return s of computing in a time step of equal walkers side by side, and number of evaluations of forces for one,
-        from the first steps of their walks: those of a stride, or as many as ``seconds`` s of computing allow."""
+        """Return s of computing in a time step of equal walkers side by side, and
+        number of evaluations of forces for one, from the first steps of their walks:
+        those of a stride, or as many as ``seconds`` s of computing allow."""
         ...
 
 
 def engine(name: str) -> Engine:
-    """Return the engine of a name; ValueError for unknown engines and those that are not installed.
+    """Return the engine of a name; ValueError for unknown engines and those that are
+    not installed.
 
     Examples
     --------

@@ -1,4 +1,5 @@
-"""Surfaces of rigid bodies that touch the ground, triangles in the frames of their bodies, and the ground. SI units."""
+"""Surfaces of rigid bodies that touch the ground, triangles in the frames of their
+bodies, and the ground. SI units."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ from rft.terradynamics.plates.outline import Outline
 
 @dataclass(frozen=True)
 class Grains:
-    """The ground under the bodies. law: `Extruded`, a map of the vertical plane, or `Spatial`."""
+    """The ground under the bodies. law: `Extruded`, a map of the vertical plane, or
+    `Spatial`."""
 
     law: Extruded | Spatial
     strength: Annotated[float, Number(0, 1e9, "-", "factor of the law's stress")] = 1.0
@@ -49,8 +51,9 @@ class Grains:
 
 
 class Surface(NamedTuple):
-    """A surface of one body. body: number of the body. corners: (T, 3, 3), m, and normals: (T, 3), unit vectors, of triangles
-    in the body's frame. sheet: whether they are one side of a thin sheet, of which either side may lead. geom: number of the
+    """A surface of one body. body: number of the body. corners: (T, 3, 3), m, and
+    normals: (T, 3), unit vectors, of triangles in the body's frame. sheet: whether they
+    are one side of a thin sheet, of which either side may lead. geom: number of the
     geom that the surface stands for; None for all geoms of the body."""
 
     body: int
@@ -63,8 +66,8 @@ class Surface(NamedTuple):
     def from_mesh(
         cls, body: int, mesh: Mesh, rotation=None, place=(0.0, 0.0, 0.0)
     ) -> Surface:
-        """Return the surface of a mesh, a sheet if the mesh is open. rotation: (3, 3), and place: (3,), m, of the mesh's frame
-        in that of the body."""
+        """Return the surface of a mesh, a sheet if the mesh is open. rotation: (3, 3),
+        and place: (3,), m, of the mesh's frame in that of the body."""
         matrix = (
             np.eye(3) if rotation is None else np.asarray(rotation, float).reshape(3, 3)
         )
@@ -79,10 +82,11 @@ class Surface(NamedTuple):
     def from_outline(
         cls, body: int, outline: Outline, place=(0.0, 0.0, 0.0), side: int = 0
     ) -> Surface:
-        """Return the surface of an outline of the vertical plane across its width, with the sides of a closed one.
+        """Return the surface of an outline of the vertical plane across its width, with
+        the sides of a closed one.
 
-        side: 0 for triangles in two halves that are mirror images; 1 and -1 for triangles in one piece, each the mirror image
-        of the other."""
+        side: 0 for triangles in two halves that are mirror images; 1 and -1 for
+        triangles in one piece, each the mirror image of the other."""
         edges = np.linspace(-outline.width / 2, outline.width / 2, 2 if side else 3)
         corners = [
             _strip(outline, a, b, (side or a + b) > 0) for a, b in pairwise(edges)
@@ -102,15 +106,20 @@ class Surface(NamedTuple):
 
 
 def _strip(outline: Outline, low: float, high: float, left: bool) -> np.ndarray:
-    """Return triangles (2 N, 3, 3) of an outline from y = low to high, two for each element."""
+    """Return triangles (2 N, 3, 3) of an outline from y = low to high, two for each
+    element."""
     low, high = (np.insert(outline.points, 1, y, axis=1) for y in (low, high))
-    a, b, c, d = low[:-1], low[1:], high[1:], high[:-1]
+    a = low[:-1]
+    b = low[1:]
+    c = high[1:]
+    d = high[:-1]
     first, second = ((a, d, b), (b, d, c)) if left else ((a, d, c), (a, c, b))
     return np.concatenate([np.stack(first, 1), np.stack(second, 1)])
 
 
 def _side(outline: Outline, y: float) -> np.ndarray:
-    """Return a fan of triangles (N - 2, 3, 3) in the plane at y, with normals away from the middle."""
+    """Return a fan of triangles (N - 2, 3, 3) in the plane at y, with normals away from
+    the middle."""
     ring = np.insert(outline.points[:-1], 1, y, axis=1)
     first = np.broadcast_to(ring[0], ring[2:].shape)
     return np.stack(
@@ -121,9 +130,10 @@ def _side(outline: Outline, y: float) -> np.ndarray:
 class Facets:
     """All surfaces that touch the ground.
 
-    bodies: (B,), numbers of their bodies, in the order of all arrays over bodies. corners: (T, 3, 3), m, of triangles in
-    their bodies' frames. owner: (T,), index into ``bodies`` of each triangle. reach: (B,), m, of the farthest corner from
-    its body's origin."""
+    bodies: (B,), numbers of their bodies, in the order of all arrays over bodies.
+    corners: (T, 3, 3), m, of triangles in their bodies' frames. owner: (T,), index into
+    ``bodies`` of each triangle. reach: (B,), m, of the farthest corner from its body's
+    origin."""
 
     def __init__(self, surfaces: Sequence[Surface]):
         require(len(surfaces) > 0, "no geoms that touch the ground")
@@ -138,7 +148,8 @@ class Facets:
         )
 
     def heights(self, rotation, place) -> np.ndarray:
-        """Return the heights (T, 3), m, of the corners for rotations (B, 3, 3) and places (B, 3) of the bodies."""
+        """Return the heights (T, 3), m, of the corners for rotations (B, 3, 3) and
+        places (B, 3) of the bodies."""
         return (
             np.einsum("tcj,tj->tc", self.corners, rotation[self.owner, 2])
             + place[self.owner, 2:]

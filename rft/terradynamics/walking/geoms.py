@@ -12,19 +12,23 @@ from rft.terradynamics.meshes.geoms import mesh_of_elements
 from rft.terradynamics.meshes.mesh import Mesh
 from rft.terradynamics.walking.facets import Surface
 
-USUAL = 12  # `rft.terradynamics.walking.Fineness.elements` for which a geom has as many as its shape asks for
+# `rft.terradynamics.walking.Fineness.elements` for which a geom has as many as its
+# shape asks for
+USUAL = 12
 
 
 def geom_mesh(model: mujoco.MjModel, geom: int, elements: int = USUAL) -> Mesh:
-    """Return the mesh of a geom in its own frame, as in `rft.mujoco.attach`: with as many elements as its shape asks for,
-    and edges shorter or longer in proportion where ``elements`` is not `USUAL`. ValueError for a geom that has no inside.
+    """Return the mesh of a geom in its own frame, as in `rft.mujoco.attach`: with as
+    many elements as its shape asks for, and edges shorter or longer in proportion where
+    ``elements`` is not `USUAL`. ValueError for a geom that has no inside.
 
     The triangles of a mesh geom are cut in four for each factor of 2."""
     return mesh_of_elements(model, geom, share=USUAL / elements)
 
 
 def surfaces(model: mujoco.MjModel, meshes: Mapping[str, Mesh]) -> list[Surface]:
-    """Return surfaces by the names of their geoms, from meshes in the geoms' frames; a mesh may differ from its geom."""
+    """Return surfaces by the names of their geoms, from meshes in the geoms' frames; a
+    mesh may differ from its geom."""
     out = []
     for name, mesh in meshes.items():
         geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)

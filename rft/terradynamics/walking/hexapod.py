@@ -1,9 +1,11 @@
-"""Robots of the vertical plane as MuJoCo models: a box on rotary legs on both sides, in an alternating tripod.
+"""Robots of the vertical plane as MuJoCo models: a box on rotary legs on both sides, in
+an alternating tripod.
 
-The left leg of a hip is the first of the planar engine's two, the right one half a cycle behind. What the plane does not
-determine is assumed: legs touch the sides of the body, and the moments of inertia about roll and yaw have the same ratio to
-those of the box as that about pitch. Legs have hardly any mass. Servos rotate them, so stiff that the weight of the robot at
-the end of a leg rotates it by 1e-4 rad.
+The left leg of a hip is the first of the planar engine's two, the right one half a
+cycle behind. What the plane does not determine is assumed: legs touch the sides of the
+body, and the moments of inertia about roll and yaw have the same ratio to those of the
+box as that about pitch. Legs have hardly any mass. Servos rotate them, so stiff that
+the weight of the robot at the end of a leg rotates it by 1e-4 rad.
 """
 
 from __future__ import annotations
@@ -17,7 +19,9 @@ from rft.terradynamics.walking.facets import Surface
 from rft.terradynamics.walking.robot import Robot, Roller
 
 LEG_MASS = 1e-6  # of a leg over the robot's
-MOTOR_INERTIA = 1e-3  # about the axis, over the robot's mass times a reach squared, assumed: without it, light legs exceed
+# about the axis, over the robot's mass times a reach squared, assumed: without it,
+# light legs exceed
+MOTOR_INERTIA = 1e-3
 # the accelerations that MuJoCo allows
 DEFLECTION = 1e-4  # rad, of a leg with the robot's weight at its end
 SERVO_TIME = 1e-2  # s, time constant of a servo; walks set it by their clock
@@ -30,9 +34,10 @@ PLANAR = (("slide", "1 0 0"), ("slide", "0 0 1"), ("hinge", "0 1 0"))
 
 
 def mjcf(robot: Robot, elements: int = 12, planar: bool = False) -> str:
-    """Return the model as XML: a body "hull" and "leg0", "leg1", ... hinged to it, hip by hip, the left leg before the right
-    one, with position actuators of the same names. planar: whether the hull stays in the plane, without roll, yaw and
-    sideways motion."""
+    """Return the model as XML: a body "hull" and "leg0", "leg1", ... hinged to it, hip
+    by hip, the left leg before the right one, with position actuators of the same
+    names. planar: whether the hull stays in the plane, without roll, yaw and sideways
+    motion."""
     legs = robot.leg(elements)
     reach = float(np.abs(legs.points).max())
     root, hull = empty_model()
@@ -82,7 +87,8 @@ def empty_model() -> tuple[ET.Element, ET.Element]:
 
 
 def add_box(hull: ET.Element, sides) -> None:
-    """Add a box with these sides (3,), m, about the hull's middle, which is drawn and touches nothing."""
+    """Add a box with these sides (3,), m, about the hull's middle, which is drawn and
+    touches nothing."""
     ET.SubElement(
         hull,
         "geom",
@@ -94,7 +100,8 @@ def add_box(hull: ET.Element, sides) -> None:
 
 
 def add_axle(body: ET.Element, name: str, axis, inertia: float) -> None:
-    """Add a hinge with the inertia of a motor, which the hull does not feel. inertia: kg m^2, of the robot's mass."""
+    """Add a hinge with the inertia of a motor, which the hull does not feel. inertia:
+    kg m^2, of the robot's mass."""
     armature = repr(float(MOTOR_INERTIA * inertia))
     ET.SubElement(
         body, "joint", name=name, type="hinge", axis=text(axis), armature=armature
@@ -110,8 +117,9 @@ def add_servo(motors: ET.Element, name: str, stiffness: float) -> None:
 
 
 def inertia(robot: Robot, reach: float) -> np.ndarray:
-    """Return moments of inertia (3,), kg m^2, about x, y, z: those of the box, scaled so that the one about y is the robot's.
-    Those of a robot that is kept level do not matter."""
+    """Return moments of inertia (3,), kg m^2, about x, y, z: those of the box, scaled
+    so that the one about y is the robot's. Those of a robot that is kept level do not
+    matter."""
     if isinstance(robot, Roller):
         return np.full(3, robot.mass * reach**2)
     square = np.array([robot.length, robot.width, robot.height]) ** 2
@@ -120,7 +128,8 @@ def inertia(robot: Robot, reach: float) -> np.ndarray:
 
 
 def hips(robot: Robot) -> list[tuple[float, float, float]]:
-    """Return the hip of each leg from the hull's middle, m: left (y > 0) and right of one hip after the other."""
+    """Return the hip of each leg from the hull's middle, m: left (y > 0) and right of
+    one hip after the other."""
     sides = (0.0,) if isinstance(robot, Roller) else robot.sides
     return [
         (x, side * y, robot.hip_height)
@@ -146,8 +155,11 @@ def phases(robot: Robot) -> np.ndarray:
 
 
 def surfaces(robot: Robot, elements: int) -> list[Surface]:
-    """Return the surfaces that touch the ground: the hull, body 1 of the model, and its legs."""
-    leg, belly, sides = robot.leg(elements), robot.belly(elements), _sides(robot)
+    """Return the surfaces that touch the ground: the hull, body 1 of the model, and its
+    legs."""
+    leg = robot.leg(elements)
+    belly = robot.belly(elements)
+    sides = _sides(robot)
     hull = [Surface.from_outline(1, belly)] if belly else []
     return hull + [
         Surface.from_outline(2 + k, leg, side=sides[k % len(sides)])
@@ -156,7 +168,8 @@ def surfaces(robot: Robot, elements: int) -> list[Surface]:
 
 
 def _leg_geoms(legs, thick: float):
-    """Yield geoms that draw an outline, a box for each of its elements, ``thick`` m thick."""
+    """Yield geoms that draw an outline, a box for each of its elements, ``thick`` m
+    thick."""
     along = np.diff(legs.points, axis=0)
     for (x, z), (dx, dz), length in zip(legs.midpoints, along, legs.lengths):
         size = np.array([length, legs.width, thick]) / 2

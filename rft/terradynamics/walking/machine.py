@@ -1,4 +1,5 @@
-"""Robots as MuJoCo machines: a model, its surfaces that touch the ground, and the clock that drives its actuators."""
+"""Robots as MuJoCo machines: a model, its surfaces that touch the ground, and the clock
+that drives its actuators."""
 
 from __future__ import annotations
 
@@ -28,8 +29,9 @@ SERVO_TIME = (
 
 
 class Machine(NamedTuple):
-    """A robot for MuJoCo. model: compiled. surfaces: those that touch the ground. root: number of the body that walks. driven:
-    (K,), numbers of the actuators that follow the clock. phases: (K,), of these, cycles."""
+    """A robot for MuJoCo. model: compiled. surfaces: those that touch the ground. root:
+    number of the body that walks. driven: (K,), numbers of the actuators that follow
+    the clock. phases: (K,), of these, cycles."""
 
     model: mujoco.MjModel
     surfaces: list[Surface]
@@ -41,8 +43,9 @@ class Machine(NamedTuple):
 def machine(
     robot: Robot, elements: int, planar: bool = False, pieces: int = 1
 ) -> Machine:
-    """Return the machine of a robot. elements: number of elements, or of edges, of its surfaces. planar: whether a robot of
-    the vertical plane stays in it. pieces: into which the elements of such a robot are cut."""
+    """Return the machine of a robot. elements: number of elements, or of edges, of its
+    surfaces. planar: whether a robot of the vertical plane stays in it. pieces: into
+    which the elements of such a robot are cut."""
     if isinstance(robot, Mjcf):
         surfaces = robot.surfaces(elements)
         root = int(robot.model.body_rootid[surfaces[0].body])
@@ -66,37 +69,43 @@ def machine(
 
 
 def pace_servos(machine: Machine, frequency: float) -> None:
-    """Let the servos of legs or screws follow a clock of a frequency, Hz, with the time constant `SERVO_TIME`.
+    """Let the servos of legs or screws follow a clock of a frequency, Hz, with the time
+    constant `SERVO_TIME`.
 
-    Angles would swing where this is less than half of a step of MuJoCo, which holds their force by the angle."""
+    Angles would swing where this is less than half of a step of MuJoCo, which holds
+    their force by the angle."""
     bias = machine.model.actuator_biasprm
     bias[machine.driven, 2] = bias[machine.driven, 1] * SERVO_TIME / frequency
 
 
 class Clock:
-    """Controls of a machine's actuators by the clock of a gait. A driven actuator with the force
-    g u + b_0 + b_1 length + b_2 velocity gets the control u for which its force is 0 at the clock's length and rate; the
-    others have the controls of the model's first keyframe, or 0."""
+    """Controls of a machine's actuators by the clock of a gait. A driven actuator with
+    the force g u + b_0 + b_1 length + b_2 velocity gets the control u for which its
+    force is 0 at the clock's length and rate; the others have the controls of the
+    model's first keyframe, or 0."""
 
     def __init__(self, machine: Machine, gait: Tripod):
-        model, self.machine, self.gait = machine.model, machine, gait
+        model = machine.model
+        self.machine = machine
+        self.gait = gait
         self.rest = model.key_ctrl[0].copy() if model.nkey else np.zeros(model.nu)
-        self.gain, self.bias = (
-            model.actuator_gainprm[machine.driven, 0],
-            model.actuator_biasprm[machine.driven, :3],
-        )
+        self.gain = model.actuator_gainprm[machine.driven, 0]
+        self.bias = model.actuator_biasprm[machine.driven, :3]
 
     def actuator_motion(
         self, time: float, rate_time: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return lengths and rates (K,) of the driven actuators at a time, s, by the rates of the clock at ``rate_time``, s."""
-        f, phases = self.gait.frequency, self.machine.phases
+        """Return lengths and rates (K,) of the driven actuators at a time, s, by the
+        rates of the clock at ``rate_time``, s."""
+        f = self.gait.frequency
+        phases = self.machine.phases
         return self.gait.angle(
             f * time + phases, f * rate_time + phases
         ), f * self.gait.rate(f * rate_time + phases)
 
     def __call__(self, time: float, rate_time: float) -> np.ndarray:
-        """Return the controls (nu,) at a time, s, by the rates of the clock at ``rate_time``, s."""
+        """Return the controls (nu,) at a time, s, by the rates of the clock at
+        ``rate_time``, s."""
         angle, rate = self.actuator_motion(time, rate_time)
         controls = self.rest.copy()
         controls[self.machine.driven] = (
@@ -106,7 +115,8 @@ class Clock:
         return controls
 
     def kinks(self) -> list[float]:
-        """Return the phases, from 0 to 1, at which an actuator's rate may jump, with both ends."""
+        """Return the phases, from 0 to 1, at which an actuator's rate may jump, with
+        both ends."""
         if len(self.gait.kinks) == 2:
             return [0.0, 1.0]
         ends = [
@@ -124,20 +134,26 @@ class Clock:
                 body.data.qvel[body.model.jnt_dofadr[joint]] = rate / gear
 
     def _driven_joints(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the joints (K,) of the driven actuators and their gears, 0 for those that turn or slide no joint."""
-        model, driven = self.machine.model, self.machine.driven
-        joints, gears = model.actuator_trnid[driven, 0], model.actuator_gear[driven, 0]
+        """Return the joints (K,) of the driven actuators and their gears, 0 for those
+        that turn or slide no joint."""
+        model = self.machine.model
+        driven = self.machine.driven
+        joints = model.actuator_trnid[driven, 0]
+        gears = model.actuator_gear[driven, 0]
         simple = np.isin(model.jnt_type[joints], (SLIDE, HINGE))
         simple &= model.actuator_trntype[driven] == JOINT
         return joints, np.where(simple, gears, 0.0)
 
     def set_start(self, body: Multibody) -> None:
-        """Set a body to its state at time 0: driven actuators by the clock, all else as in the first keyframe, if there is one,
-        at rest, and at the height where the lowest point of all surfaces is on the ground."""
-        model, data = body.model, body.data
+        """Set a body to its state at time 0: driven actuators by the clock, all else as
+        in the first keyframe, if there is one, at rest, and at the height where the
+        lowest point of all surfaces is on the ground."""
+        model = body.model
+        data = body.data
         if model.nkey:
             mujoco.mj_resetDataKeyframe(model, data, 0)
-        data.time, data.qvel[:] = 0.0, 0.0
+        data.time = 0.0
+        data.qvel[:] = 0.0
         lengths, _ = self.actuator_motion(0.0, 1e-9)
         holds = model.actuator_biasprm[self.machine.driven, 1] != 0.0
         for joint, gear, length, held in zip(*self._driven_joints(), lengths, holds):
@@ -155,7 +171,8 @@ class Clock:
 
     def _height_index(self) -> int | None:
         """Return the index in qpos of the machine's height; None if it cannot fall."""
-        model, root = self.machine.model, self.machine.root
+        model = self.machine.model
+        root = self.machine.root
         for joint in np.flatnonzero(model.jnt_bodyid == root):
             if model.jnt_type[joint] == FREE:
                 return int(model.jnt_qposadr[joint]) + 2

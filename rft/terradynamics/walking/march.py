@@ -1,8 +1,9 @@
-"""Steps in time of many robots at once, each at its own rate (`rft.terradynamics.walking.sdirk`).
+"""Steps in time of many robots at once, each at its own rate
+(`rft.terradynamics.walking.sdirk`).
 
-Steps end where the clock's rate jumps. Some robots stick where others slip, and take ten times as many iterations. So no
-robot waits for another: each evaluation of forces is a batch of all robots under way, every one in its own step, stage and
-iteration."""
+Steps end where the clock's rate jumps. Some robots stick where others slip, and take
+ten times as many iterations. So no robot waits for another: each evaluation of forces
+is a batch of all robots under way, every one in its own step, stage and iteration."""
 
 from __future__ import annotations
 
@@ -35,13 +36,14 @@ UNENDING = (
 def march(
     robots: Robots, index, state: State, phases, rate_phases, ends=UNENDING
 ) -> tuple[State, np.ndarray]:
-    """Return the states after every step (S, B) of the robots ``index`` from a state, and how often forces were evaluated
-    (B,).
+    """Return the states after every step (S, B) of the robots ``index`` from a state,
+    and how often forces were evaluated (B,).
 
     The steps go from phase to phase (S + 1,), in cycles. In each the legs rotate at the
     rates of the clock at ``rate_phases`` (S,), which tell the side of a kink. ends: see
     `rft.terradynamics.walking.sdirk.has_ended`; a robot at an end stays there."""
-    index, phases = np.asarray(index), np.asarray(phases)
+    index = np.asarray(index)
+    phases = np.asarray(phases)
     starts = np.broadcast_to(phases[:-1, None], (len(rate_phases), len(index)))
     angles, rates = robots.leg_motion(
         starts, np.broadcast_to(np.asarray(rate_phases)[:, None], starts.shape), index
@@ -61,8 +63,8 @@ def march(
 def step(
     robots: Robots, state: State, phase: float, rate_phase: float, dt: float
 ) -> State:
-    """Return the state of robots of one frequency after a time step dt, s, from a phase, with the legs at the rates of the
-    clock at ``rate_phase``."""
+    """Return the state of robots of one frequency after a time step dt, s, from a
+    phase, with the legs at the rates of the clock at ``rate_phase``."""
     phases = phase, phase + dt * robots.frequency[0, 0]
     return march(robots, range(len(robots)), state, phases, [rate_phase])[0].take(0)
 
@@ -77,22 +79,28 @@ def run_steps_by_numpy(
     ends,
     effort: Effort,
 ):
-    """Return the states after each step (S, B, 11) and the numbers of evaluations (B,), from packed states (B, 11).
+    """Return the states after each step (S, B, 11) and the numbers of evaluations (B,),
+    from packed states (B, 11).
 
-    angles: (S, B, K), of the legs at the beginning of each step, rad. rates: (S, B, K), rad/s. lengths: (S, B), s. ends:
-    (2, B)."""
+    angles: (S, B, K), of the legs at the beginning of each step, rad. rates: (S, B, K),
+    rad/s. lengths: (S, B), s. ends: (2, B)."""
     count, size = lengths.shape
-    states, tries = np.empty((count, *start.shape)), np.zeros(size, int)
-    # Of the robots under way: their columns, the numbers of their steps, and where they are in them.
-    column, number, steps = np.arange(size), np.zeros(size, int), unpacked(start)
+    states = np.empty((count, *start.shape))
+    tries = np.zeros(size, int)
+    # Of the robots under way: their columns, the numbers of their steps, and where they
+    # are in them.
+    column = np.arange(size)
+    number = np.zeros(size, int)
+    steps = unpacked(start)
     while column.size:
-        robot, length = index[column], lengths[number, column]
-        h, time = steps.stage.part * length, (stage_time(steps.stage) * length)[:, None]
-        width, rate = (
-            gather(effort.widths, steps.newton.width, 0),
-            rates[number, column],
-        )
-        ground, k = robots.ground_under(robot, width), GAMMA * h
+        robot = index[column]
+        length = lengths[number, column]
+        h = steps.stage.part * length
+        time = (stage_time(steps.stage) * length)[:, None]
+        width = gather(effort.widths, steps.newton.width, 0)
+        rate = rates[number, column]
+        ground = robots.ground_under(robot, width)
+        k = GAMMA * h
         residual, slopes, power = robots.residual(
             robot, steps.stage.base, steps.stage.start, steps.newton.trial, angles[number, column] + time * rate, rate, k,
             ground,
@@ -114,7 +122,8 @@ def run_steps_by_numpy(
             continue
         steps, over = next_problem(steps, solved, failed, tolerance, k, h, effort)
         if over.any():
-            row, pose = packed(steps), steps.accepted.pose
+            row = packed(steps)
+            pose = steps.accepted.pose
             states[number[over], column[over]] = row[over]
             number = number + over
             ended = over & has_ended(pose[1], pose[2], ends[:, column])
@@ -122,11 +131,9 @@ def run_steps_by_numpy(
                 states[number[j] :, column[j]] = row[j]
             active = ~ended & (number < count)
             if not active.all():
-                steps, column, number = (
-                    select(steps, active),
-                    column[active],
-                    number[active],
-                )
+                steps = select(steps, active)
+                column = column[active]
+                number = number[active]
     return states, tries
 
 

@@ -1,4 +1,5 @@
-"""Custom robots: any MJCF, with a list of the geoms that touch the ground. Needs MuJoCo."""
+"""Custom robots: any MJCF, with a list of the geoms that touch the ground. Needs
+MuJoCo."""
 
 from __future__ import annotations
 
@@ -27,12 +28,14 @@ MISSING = "an MJCF needs MuJoCo: pip install 'geomech[mujoco]'"
 class Mjcf(Robot):
     """A robot of an MJCF file, walking along x, the ground at z = 0.
 
-    mjcf (-): name of the file; in a scene file, from the scene's folder. geoms (-): names of the geoms that touch the ground,
-    and nothing else. actuators (-): names of the <position> or <velocity> actuators that the gait's clock drives; by default
-    all of them. phases (-): phase of each of these actuators, in cycles; by default 0.
+    mjcf (-): name of the file; in a scene file, from the scene's folder. geoms (-):
+    names of the geoms that touch the ground, and nothing else. actuators (-): names of
+    the <position> or <velocity> actuators that the gait's clock drives; by default all
+    of them. phases (-): phase of each of these actuators, in cycles; by default 0.
 
-    Other actuators keep the controls of the first keyframe, or 0. The robot starts as in the first keyframe, if there is one,
-    at the height where the lowest of its geoms is on the ground.
+    Other actuators keep the controls of the first keyframe, or 0. The robot starts as
+    in the first keyframe, if there is one, at the height where the lowest of its geoms
+    is on the ground.
     """
 
     mjcf: str
@@ -92,7 +95,8 @@ class Mjcf(Robot):
         return float(self.model.body_mass.sum())
 
     def _find_geoms(self) -> None:
-        """Set the numbers of the geoms; ValueError for unknown ones and for those of the world."""
+        """Set the numbers of the geoms; ValueError for unknown ones and for those of
+        the world."""
         model = self.model
         require(
             model.nv > 0,
@@ -114,7 +118,8 @@ class Mjcf(Robot):
         object.__setattr__(self, "geom_numbers", np.array(numbers))
 
     def _number(self, kind: str, name: str, count: int) -> int:
-        """Return the number of the model's geom or actuator of a name; a ValueError names the nearest, or the first few."""
+        """Return the number of the model's geom or actuator of a name; a ValueError
+        names the nearest, or the first few."""
         import mujoco
 
         kinds = getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
@@ -135,7 +140,8 @@ class Mjcf(Robot):
         return number
 
     def _find_driven(self) -> None:
-        """Set the numbers and phases of the actuators that the clock drives; ValueError for actuators that it cannot drive."""
+        """Set the numbers and phases of the actuators that the clock drives; ValueError
+        for actuators that it cannot drive."""
         import mujoco
 
         model = self.model
@@ -200,7 +206,8 @@ class Mjcf(Robot):
         object.__setattr__(self, "driven", driven)
 
     def surfaces(self, elements: int) -> list[Surface]:
-        """Return the surfaces of the geoms, with ``elements`` edges around round ones."""
+        """Return the surfaces of the geoms, with ``elements`` edges around round
+        ones."""
         from rft.terradynamics.walking import geoms
 
         in_range("elements", elements, 4, 1000, whole=True)
@@ -223,8 +230,9 @@ class Mjcf(Robot):
 
 
 def require_bounded(path: Path) -> None:
-    """Raise Refusal for an MJCF that would keep MuJoCo busy for long, or wait: copies by <replicate>, nodes of height fields,
-    and files that are included but no ordinary ones. What is no XML is left to MuJoCo."""
+    """Raise Refusal for an MJCF that would keep MuJoCo busy for long, or wait: copies
+    by <replicate>, nodes of height fields, and files that are included but no ordinary
+    ones. What is no XML is left to MuJoCo."""
     try:
         _count_parts(path, _Counted(1, 0, 0), [path.parent])
     except RecursionError:
@@ -233,7 +241,8 @@ def require_bounded(path: Path) -> None:
 
 @dataclass
 class _Counted:
-    """Parts of an MJCF so far. copies: of a part, by the <replicate> around it. geoms, nodes: of height fields."""
+    """Parts of an MJCF so far. copies: of a part, by the <replicate> around it. geoms,
+    nodes: of height fields."""
 
     copies: int
     geoms: int
@@ -241,7 +250,8 @@ class _Counted:
 
 
 def _count_parts(path: Path, counted: _Counted, within: list[Path]) -> None:
-    """Add the parts of a file and of those that it includes. within: folders of the files around it."""
+    """Add the parts of a file and of those that it includes. within: folders of the
+    files around it."""
     name = path.name
     require(path.is_file(), f"{name} is no ordinary file")
     require(
@@ -293,12 +303,14 @@ def _whole(text: str | None) -> int:
 
 
 def _compiled(file: str):
-    """Return the model of a file and its digest; ValueError of one line if MuJoCo cannot read the file."""
+    """Return the model of a file and its digest; ValueError of one line if MuJoCo
+    cannot read the file."""
     try:
         import mujoco
     except ImportError:
         raise Refusal(MISSING) from None
-    # MuJoCo writes warnings to the screen and to a file; the checks below refuse what matters.
+    # MuJoCo writes warnings to the screen and to a file; the checks below refuse what
+    # matters.
     mujoco.set_mju_user_warning(lambda _: None)
     path = Path(file)
     try:
@@ -346,8 +358,8 @@ def _compiled(file: str):
 
 
 def _not_finite(model) -> str:
-    """Return the names of arrays with nan or inf, as "keyframe qpos, body_pos", but for those that MuJoCo computes from
-    others."""
+    """Return the names of arrays with nan or inf, as "keyframe qpos, body_pos", but for
+    those that MuJoCo computes from others."""
     arrays = {
         name: getattr(model, name)
         for name in dir(model)

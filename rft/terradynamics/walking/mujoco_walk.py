@@ -1,11 +1,13 @@
 """The engine of three dimensions: robots as MuJoCo models in sand
 (`rft.terradynamics.walking.multibody`), one after the other.
 
-MuJoCo's steps are of order 1, and its triangles lead as a whole or not at all. So it takes `SUBSTEPS` for each time step,
-and cuts an element of a leg or belly into `PIECES`, which makes both errors as small as those of the planar engine.
+MuJoCo's steps are of order 1, and its triangles lead as a whole or not at all. So it
+takes `SUBSTEPS` for each time step, and cuts an element of a leg or belly into
+`PIECES`, which makes both errors as small as those of the planar engine.
 
-A robot of the vertical plane becomes a hull on legs at both sides that is free to roll, yaw and drift
-(`rft.terradynamics.walking.hexapod`); a custom MJCF is used as it is. A walk ends with the stride that repeats the last one.
+A robot of the vertical plane becomes a hull on legs at both sides that is free to roll,
+yaw and drift (`rft.terradynamics.walking.hexapod`); a custom MJCF is used as it is. A
+walk ends with the stride that repeats the last one.
 """
 
 from __future__ import annotations
@@ -149,15 +151,16 @@ def step_cost(
     """Return the cost of a time step; see
     `rft.terradynamics.walking.engines.Engine.step_cost`."""
     (walker,) = walkers
-    body, h = (
-        Simulation(walker, numerics).body,
-        1 / (walker.gait.frequency * numerics.steps),
-    )
+    body = Simulation(walker, numerics).body
+    h = 1 / (walker.gait.frequency * numerics.steps)
     with body.in_sand():
-        begin, elapsed, steps = time.process_time(), 0.0, 0
+        begin = time.process_time()
+        elapsed = 0.0
+        steps = 0
         while steps < numerics.steps and elapsed < seconds:
             body.step(h)
-            elapsed, steps = time.process_time() - begin, steps + 1
+            elapsed = time.process_time() - begin
+            steps = steps + 1
     return elapsed / steps, body.iterations / (steps * body.substeps)
 
 
@@ -182,7 +185,8 @@ class Simulation:
         advance: Callable = compute_stride,
     ):
         refuse(walker)
-        self.arguments, self.advance = (walker, numerics, planar), advance
+        self.arguments = (walker, numerics, planar)
+        self.advance = advance
         self.machine = machine(walker.robot, numerics.elements, planar, PIECES)
         self.gait = walker.gait
         # Legs and screws of hardly any mass turn as the clock does, also where its rate
@@ -191,7 +195,8 @@ class Simulation:
         if self.prescribed:
             pace_servos(self.machine, walker.gait.frequency)
         self.clock = Clock(self.machine, walker.gait)
-        root, facets = self.machine.root, Facets(self.machine.surfaces)
+        root = self.machine.root
+        facets = Facets(self.machine.surfaces)
         legs = facets.bodies != root
         self.reach = float(
             facets.reach[legs].max() if legs.any() else facets.reach.max()
@@ -235,21 +240,19 @@ class Simulation:
         if start is not None:
             body.data.qpos[:], body.data.qvel[:] = start
             body.update()
-        cycles, moves, periodic, drift, before = (
-            limit_cycle.begin(1),
-            [],
-            False,
-            np.inf,
-            0.0,
-        )
-        rows, states, last, ended = (
-            [self.row()],
-            [body.data.qpos.copy()],
-            self.scaled_state(),
-            self.end_status(),
-        )
+        cycles = limit_cycle.begin(1)
+        moves = []
+        periodic = False
+        drift = np.inf
+        before = 0.0
+        rows = [self.row()]
+        states = [body.data.qpos.copy()]
+        last = self.scaled_state()
+        ended = self.end_status()
         for stride in range(most):
-            first, start_row, before = rows[-1], len(rows) - 1, body.defect
+            first = rows[-1]
+            start_row = len(rows) - 1
+            before = body.defect
             ended = ended or self.stride(stride, rows, states)
             if progress:
                 progress((stride + 1) / most)
@@ -261,7 +264,8 @@ class Simulation:
             )
             drift = float(cycles.drift[0])
             now = self.scaled_state()
-            change, last = np.abs(now - last).max(), now
+            change = np.abs(now - last).max()
+            last = now
             periodic = bool(drift <= SETTLED * self.reach and change < REPEATED)
             if periodic and (
                 duration is None or _goes_straight(first, rows[-1], duration)
@@ -270,7 +274,8 @@ class Simulation:
         limit = (
             None if ended else Start(self.unwound(stride + 1), body.data.qvel.copy())
         )
-        table, path = np.array(rows), np.array(states)
+        table = np.array(rows)
+        path = np.array(states)
         unsolved_error = (
             body.defect - before if periodic else body.defect / max(1, len(moves))
         )
@@ -330,15 +335,18 @@ class Simulation:
         return self.end_status()
 
     def steps(self, stride: int, state: tuple) -> tuple[np.ndarray, np.ndarray, tuple]:
-        """Return rows and positions after each step of a stride, or until the robot's end, and the body's state then. state:
-        that of the body now, on which the result depends."""
+        """Return rows and positions after each step of a stride, or until the robot's
+        end, and the body's state then. state: that of the body now, on which the result
+        depends."""
         with self.body.in_sand():
             return self._steps(stride)
 
     def _steps(self, stride: int) -> tuple[np.ndarray, np.ndarray, tuple]:
         """Return what `steps` does, in the sand."""
-        rows, states = [], []
-        f, data = self.gait.frequency, self.body.data
+        rows = []
+        states = []
+        f = self.gait.frequency
+        data = self.body.data
         for begin, end, steps in self.intervals:
             rate_time = (stride + (begin + end) / 2) / f
             if self.prescribed:
@@ -355,8 +363,10 @@ class Simulation:
     def row(self) -> list[float]:
         """Return the numbers named in `ROW`, along the world's axes; the rate is about
         the horizontal axis to the left."""
-        body, root = self.body, self.machine.root
-        place, rotation = body.data.xpos[root], body.data.xmat[root].reshape(3, 3)
+        body = self.body
+        root = self.machine.root
+        place = body.data.xpos[root]
+        rotation = body.data.xmat[root].reshape(3, 3)
         motion = np.zeros(6)
         mujoco.mj_objectVelocity(
             body.model, body.data, mujoco.mjtObj.mjOBJ_XBODY, root, motion, 0
@@ -382,8 +392,11 @@ class Simulation:
 
     def end_status(self) -> str:
         """Return "flipped", "airborne" or "sunk" for a robot at an end, else ""."""
-        data, facets, root = self.body.data, self.body.facets, self.machine.root
-        height, rotation = data.xpos[root, 2], data.xmat[root].reshape(3, 3)
+        data = self.body.data
+        facets = self.body.facets
+        root = self.machine.root
+        height = data.xpos[root, 2]
+        rotation = data.xmat[root].reshape(3, 3)
         if rotation[2, 2] < 0.0:
             return "flipped"
         if height > self.ceiling:
@@ -395,12 +408,14 @@ class Simulation:
         """Return the numbers at the start of a stride that determine all further
         motion: heights over the reach, angles, and velocities over the speed of the
         legs' ends, along and across the heading."""
-        model, data = self.body.model, self.body.data
+        model = self.body.model
+        data = self.body.data
         rotation = data.xmat[self.machine.root].reshape(3, 3)
         leg_speed = 2 * np.pi * self.gait.frequency * self.reach
         numbers = [*rotation[2, :2], *(data.qvel * self.body.size / leg_speed)]
         for joint in range(model.njnt):
-            address, first = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
+            address = model.jnt_qposadr[joint]
+            first = model.jnt_dofadr[joint]
             kind = model.jnt_type[joint]
             if kind == FREE:
                 numbers.append(data.qpos[address + 2] / self.reach)
@@ -420,12 +435,11 @@ class Simulation:
     def unwound(self, strides: int) -> np.ndarray:
         """Return qpos less the full turns of hinges that the clock drives in
         ``strides`` strides."""
-        model, qpos = self.body.model, self.body.data.qpos.copy()
+        model = self.body.model
+        qpos = self.body.data.qpos.copy()
         for actuator in self.machine.driven if strides else ():
-            joint, gear = (
-                model.actuator_trnid[actuator, 0],
-                model.actuator_gear[actuator, 0],
-            )
+            joint = model.actuator_trnid[actuator, 0]
+            gear = model.actuator_gear[actuator, 0]
             hinge = (
                 model.actuator_trntype[actuator] == JOINT
                 and model.jnt_type[joint] == HINGE
@@ -447,7 +461,8 @@ def _substeps(walker: Walker, model: mujoco.MjModel) -> int:
 def _goes_straight(before, after, duration: float) -> bool:
     """Return whether a robot that repeats its motion between two rows turns by at most
     `STRAIGHT` until the duration, s."""
-    t, yaw = ROW.index("t"), ROW.index("yaw")
+    t = ROW.index("t")
+    yaw = ROW.index("yaw")
     repetitions = max(0.0, duration - after[t]) / (after[t] - before[t])
     return bool(
         abs(math.remainder(after[yaw] - before[yaw], 2 * math.pi)) * repetitions
@@ -459,12 +474,10 @@ def _moved(before, after) -> np.ndarray:
     """Return the displacement (3,) between two rows, along and to the left of the first
     one's heading, m, and the angle to the left, rad, less than half a turn."""
     x, y, yaw = (ROW.index(n) for n in ("x", "y", "yaw"))
-    dx, dy, cos, sin = (
-        after[x] - before[x],
-        after[y] - before[y],
-        np.cos(before[yaw]),
-        np.sin(before[yaw]),
-    )
+    dx = after[x] - before[x]
+    dy = after[y] - before[y]
+    cos = np.cos(before[yaw])
+    sin = np.sin(before[yaw])
     return np.array(
         [
             dx * cos + dy * sin,

@@ -88,15 +88,15 @@ class Multibody:
         model.opt.enableflags |= ENERGY
         model.opt.disableflags |= NO_RESET
         model.opt.integrator = IMPLICIT_FAST
-        self.model, self.data, self.facets = (
-            model,
-            mujoco.MjData(model),
-            Facets(surfaces),
-        )
-        self.control, self.substeps = control, substeps
+        self.model = model
+        self.data = mujoco.MjData(model)
+        self.facets = Facets(surfaces)
+        self.control = control
+        self.substeps = substeps
         self.work = self.loss = self.defect = self.residual = 0.0
         self.unsolved = self.iterations = 0
-        self._bed, self._row = bed_under(model, surfaces, grains), NO_ROW
+        self._bed = bed_under(model, surfaces, grains)
+        self._row = NO_ROW
         structure = model if hasattr(model, "D_rownnz") else self.data
         self._slope_rows = np.repeat(np.arange(model.nv), structure.D_rownnz)
         self._slope_columns = np.array(structure.D_colind)
@@ -106,7 +106,8 @@ class Multibody:
     def _sizes(self) -> np.ndarray:
         """Return the speed, m/s, per unit of each velocity (nv,): 1, or a reach, m, for
         rotations."""
-        model, data = self.model, self.data
+        model = self.model
+        data = self.data
         places = data.xpos[self.facets.bodies]
         reach = float(
             (np.linalg.norm(places - places.mean(0), axis=1) + self.facets.reach).max()
@@ -148,7 +149,8 @@ class Multibody:
 
     @contextmanager
     def in_sand(self) -> Iterator[None]:
-        """Put the sand under the model for some steps, of which each does so by itself otherwise, in a millisecond."""
+        """Put the sand under the model for some steps, of which each does so by itself
+        otherwise, in a millisecond."""
         if self._row != NO_ROW:
             yield
             return
@@ -161,14 +163,17 @@ class Multibody:
             self._row = NO_ROW
 
     def step(self, h: float, rate_time: float | None = None) -> None:
-        """Take a time step h, s, with the controls' rates at ``rate_time``, s, by default the middle of the step."""
+        """Take a time step h, s, with the controls' rates at ``rate_time``, s, by
+        default the middle of the step."""
         with self.in_sand():
             self._step(h, rate_time)
 
     def _step(self, h: float, rate_time: float | None) -> None:
         """Take a time step in the sand."""
-        model, data = self.model, self.data
-        begin, before = data.time, installed.effort(self._row)
+        model = self.model
+        data = self.data
+        begin = data.time
+        before = installed.effort(self._row)
         rate_time = begin + h / 2 if rate_time is None else rate_time
         model.opt.timestep = dt = h / self.substeps
         with warnings.catch_warnings():
@@ -196,8 +201,10 @@ class Multibody:
 
         The step moves bodies by its last velocities, at which forces of motors and
         dampers act, too."""
-        model, data = self.model, self.data
-        velocity, change = data.qvel, data.qvel - before
+        model = self.model
+        data = self.data
+        velocity = data.qvel
+        change = data.qvel - before
         by_change = data.qDeriv * change[self._slope_columns]
         implicit = np.bincount(self._slope_rows, by_change, model.nv)
         damping = model.dof_damping * change

@@ -1,7 +1,8 @@
-"""Newton's equations of light-legged robots on grains in the vertical plane, many robots at once.
+"""Newton's equations of light-legged robots on grains in the vertical plane, many
+robots at once.
 
-The state is the body's pose (x, z, pitch) and its rates; the legs have no mass and rotate by the clock.
-`rft.terradynamics.walking.march` steps in time.
+The state is the body's pose (x, z, pitch) and its rates; the legs have no mass and
+rotate by the clock. `rft.terradynamics.walking.march` steps in time.
 """
 
 from __future__ import annotations
@@ -31,10 +32,11 @@ NUDGE = 1e-3  # change of a rate for differences, over the rounding
 
 
 class State(NamedTuple):
-    """State of B robots. pose, twist: (..., B, 3) as (x, z, pitch) and their rates. work, loss: (..., B), J, of the motors
-    and in the ground since the start. unsolved: (..., B), number of steps that were accepted unsolved, since Newton's
-    method failed even at the shortest length. defect: (..., B), m/s, sum of the residuals of these steps. residual: (...,
-    B), m/s, the largest of all steps."""
+    """State of B robots. pose, twist: (..., B, 3) as (x, z, pitch) and their rates.
+    work, loss: (..., B), J, of the motors and in the ground since the start. unsolved:
+    (..., B), number of steps that were accepted unsolved, since Newton's method failed
+    even at the shortest length. defect: (..., B), m/s, sum of the residuals of these
+    steps. residual: (..., B), m/s, the largest of all steps."""
 
     pose: np.ndarray
     twist: np.ndarray
@@ -67,7 +69,8 @@ class State(NamedTuple):
         return State(*(x[index] for x in self))
 
     def put(self, index, other: State) -> State:
-        """Return a copy with the states at an index of the first axis from ``other``."""
+        """Return a copy with the states at an index of the first axis from
+        ``other``."""
         new = State(*(x.copy() for x in self))
         for x, y in zip(new, other):
             x[index] = y
@@ -77,9 +80,10 @@ class State(NamedTuple):
 class Robots:
     """B robots of equally many legs and elements on one kind of ground.
 
-    ground: (B,), with one rounding for all, which is reduced for slow legs. masses: (B, 3), mass, mass and moment of
-    inertia: those of x, z and pitch. frequency: (B, 1), Hz. hips: (2, B, K), x and z from the centre of mass, m.
-    leg_phases: (K,), cycles. reach: (B,), m, of the legs from their hips."""
+    ground: (B,), with one rounding for all, which is reduced for slow legs. masses:
+    (B, 3), mass, mass and moment of inertia: those of x, z and pitch. frequency:
+    (B, 1), Hz. hips: (2, B, K), x and z from the centre of mass, m. leg_phases: (K,),
+    cycles. reach: (B,), m, of the legs from their hips."""
 
     def __init__(
         self,
@@ -93,7 +97,8 @@ class Robots:
         self.frequency, *self.clock = _columns(
             gaits, ("frequency", "duty", "sweep", "middle")
         ).T[..., None]
-        first, count = robots[0], len(robots[0].hip_phases)
+        first = robots[0]
+        count = len(robots[0].hip_phases)
         self.leg_phases = np.array(
             [
                 (k + j) % count / count
@@ -105,10 +110,8 @@ class Robots:
         self.hips = np.stack(
             [hip_x, np.zeros_like(hip_x) + _columns(robots, ("hip_height",))]
         )
-        self.legs, belly = (
-            Outlines.from_list(_outlines(robots, "leg", elements)),
-            _outlines(robots, "belly", elements),
-        )
+        self.legs = Outlines.from_list(_outlines(robots, "leg", elements))
+        belly = _outlines(robots, "belly", elements)
         self.belly = None if belly[0] is None else Outlines.from_list(belly)
         self.elements = Elements(self.legs, self.belly, self.hips, stress)
         self.reach = np.abs(self.legs.points).max((1, 2)) + np.zeros(len(robots))
@@ -120,7 +123,8 @@ class Robots:
         return len(self.masses)
 
     def ground_under(self, index, width=1.0) -> Ground:
-        """Return the ground of these robots (B,), with the rounding times a width and the grazing sine times its root."""
+        """Return the ground of these robots (B,), with the rounding times a width and
+        the grazing sine times its root."""
         g = self.ground
         wide = {
             "rounding": g.rounding[index] * width,
@@ -130,7 +134,8 @@ class Robots:
 
     def energy(self, state: State, index=slice(None)) -> np.ndarray:
         """Return the kinetic and potential energy (..., B), J, of these robots."""
-        mass, inertia = self.masses[index, 0], self.masses[index, 2]
+        mass = self.masses[index, 0]
+        inertia = self.masses[index, 2]
         v_x, v_z, rate = np.moveaxis(state.twist, -1, 0)
         turning = np.where(np.isfinite(inertia), inertia, 0.0) * rate**2
         return (
@@ -140,7 +145,8 @@ class Robots:
         )
 
     def start(self) -> State:
-        """Return the state at rest at phase 0: level, with the lowest point of legs and body on the surface."""
+        """Return the state at rest at phase 0: level, with the lowest point of legs and
+        body on the surface."""
         angles = self.leg_motion(np.zeros(len(self)), 0.0)[0]
         low = [
             z + self.legs.lowest(angle) for z, angle in zip(self.hips[1].T, angles.T)
@@ -154,12 +160,11 @@ class Robots:
     def leg_motion(
         self, phase, rate_phase, index=slice(None)
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return angles (..., B, K), rad, and rates (..., B, K), rad/s, of the legs of these robots at phases (..., B), by
-        the rates of the clock at ``rate_phase``, (..., B) or a number."""
-        rate_phase, clock = (
-            np.asarray(rate_phase)[..., None] + self.leg_phases,
-            [x[index] for x in self.clock],
-        )
+        """Return angles (..., B, K), rad, and rates (..., B, K), rad/s, of the legs of
+        these robots at phases (..., B), by the rates of the clock at ``rate_phase``,
+        (..., B) or a number."""
+        rate_phase = np.asarray(rate_phase)[..., None] + self.leg_phases
+        clock = [x[index] for x in self.clock]
         angle = leg_angle(
             np.asarray(phase)[..., None] + self.leg_phases, rate_phase, *clock
         )
@@ -170,9 +175,11 @@ class Robots:
     def accelerations(
         self, pose, twist, angle, rate, index=None, ground: Ground | None = None
     ):
-        """Return accelerations (C, B, 3) of these robots, and power of the motors and into the ground, W, (C, B).
+        """Return accelerations (C, B, 3) of these robots, and power of the motors and
+        into the ground, W, (C, B).
 
-        pose, twist: (C, B, 3); the C motions of a robot hardly differ. angle, rate: (B, K), of the legs, rad and rad/s."""
+        pose, twist: (C, B, 3); the C motions of a robot hardly differ. angle, rate:
+        (B, K), of the legs, rad and rad/s."""
         index = np.arange(len(self)) if index is None else index
         pose, twist = (tuple(np.moveaxis(x, -1, 0)) for x in (pose, twist))
         load = self.elements.load(
@@ -182,8 +189,9 @@ class Robots:
         return np.stack(a, -1), load.motor_power, load.ground_power
 
     def residual(self, index, base, start, v, angle, rate, k, ground: Ground):
-        """Return the residual of v = start + k a(base + k v, v) of these robots, triples of (B,), its slopes by differences,
-        three columns, and power of the motors and into the ground, W, (B,)."""
+        """Return the residual of v = start + k a(base + k v, v) of these robots,
+        triples of (B,), its slopes by differences, three columns, and power of the
+        motors and into the ground, W, (B,)."""
         nudge = difference_steps(ground.rounding, self.reach[index])
         trial = tuple(x + CHANGED[j] * y for j, (x, y) in enumerate(zip(v, nudge)))
         pose = plus(base, times(k, trial))
@@ -203,7 +211,8 @@ class Robots:
 
 @formula
 def accelerations(load, mass, inertia):
-    """Return the accelerations (x, z, pitch) of a body under a `BodyLoad` and gravity."""
+    """Return the accelerations (x, z, pitch) of a body under a `BodyLoad` and
+    gravity."""
     return load.f_x / mass, load.f_z / mass - GRAVITY, load.moment / inertia
 
 
@@ -227,7 +236,8 @@ def _columns(objects: list, names: tuple[str, ...]) -> np.ndarray:
 
 
 def _outlines(robots: list[Robot], method: str, elements: int) -> list:
-    """Return the outlines of robots by one of their methods, the same object for equal robots."""
+    """Return the outlines of robots by one of their methods, the same object for equal
+    robots."""
     outlines: dict = {}
     keys = [repr(r) for r in robots]
     for r, key in zip(robots, keys):

@@ -53,7 +53,8 @@ def refuse(walker: Walker) -> None:
 
 
 def refined(numerics: Fineness) -> list[Refined]:
-    """Return half and three quarters of the steps, as one change alone may be small by chance, and twice the elements."""
+    """Return half and three quarters of the steps, as one change alone may be small by
+    chance, and twice the elements."""
     few = [max(8, numerics.steps * quarters // 4) for quarters in (2, 3)]
     return [
         Refined(replace(numerics, steps=few[0]), "steps", 1.0, 0.5),
@@ -69,7 +70,8 @@ def walk(
     progress: Callable | None = None,
     advance: Callable = compute_stride,
 ) -> list[Walk]:
-    """Return the walks of walkers; see `rft.terradynamics.walking.engines.Engine.walk`."""
+    """Return the walks of walkers; see
+    `rft.terradynamics.walking.engines.Engine.walk`."""
     walks: list = [None] * len(walkers)
     for walker in walkers:
         refuse(walker)
@@ -89,7 +91,8 @@ def walk(
 
 
 def _batches(walkers: Sequence[Walker], numerics: Fineness) -> list[list[int]]:
-    """Return the indices of walkers that can be computed as one batch, a list for each batch."""
+    """Return the indices of walkers that can be computed as one batch, a list for each
+    batch."""
     batches: dict = {}
     for k, w in enumerate(walkers):
         outlines = [
@@ -117,7 +120,8 @@ def _strides(
     walkers: Sequence[Walker], numerics: Fineness, advance: Callable = compute_stride
 ) -> Strides:
     """Return the strides of a batch of walkers."""
-    stress, grounds = replace(walkers[0].stress, zeta=1.0), [w.ground for w in walkers]
+    stress = replace(walkers[0].stress, zeta=1.0)
+    grounds = [w.ground for w in walkers]
     strength = np.array([g.strength * w.stress.zeta for g, w in zip(grounds, walkers)])
     ground = Ground(
         strength,
@@ -125,7 +129,8 @@ def _strides(
         numerics.rounding,
         np.sin(stress.grazing),
     )
-    robots, gaits = [w.robot for w in walkers], [w.gait for w in walkers]
+    robots = [w.robot for w in walkers]
+    gaits = [w.gait for w in walkers]
     return Strides(
         Robots(robots, gaits, stress, ground, numerics.elements),
         robots,
@@ -169,7 +174,8 @@ def _walk(
             rows[:, 8],
             *np.zeros((3, len(rows))),
         )
-        energy, time = strides.robots.energy(states, k), rows[-1, 0]
+        energy = strides.robots.energy(states, k)
+        time = rows[-1, 0]
         speed = rows[-1, 1] / time if time else 0.0
         own = (
             float(speed),
@@ -197,10 +203,11 @@ def _walk(
 def _settling_time(
     strides: Strides, k: int, x: list, last: State | None, walk: Walk
 ) -> float:
-    """Return `Walk.settling_time` from the places x, m, of robot k at the ends of its strides from rest.
+    """Return `Walk.settling_time` from the places x, m, of robot k at the ends of its
+    strides from rest.
 
-    last: its state at the last one, from which the slopes at the limit predict further strides; None where the strides
-    repeat themselves."""
+    last: its state at the last one, from which the slopes at the limit predict further
+    strides; None where the strides repeat themselves."""
     cycle = 1.0 / strides.frequency[k]
     if last is not None:
         moves = predicted_progress(
@@ -218,7 +225,8 @@ def _at_limits(
     limits: list[Limit],
     advance: Callable,
 ) -> list[dict]:
-    """Return the fields of `Walk` that belong to the limit cycles, from states near them."""
+    """Return the fields of `Walk` that belong to the limit cycles, from states near
+    them."""
     strides = _strides(walkers, numerics, advance)
     cycles = limit_cycles(strides, limits)
     return [_limit_fields(strides, cycles, k) for k in range(len(limits))]
@@ -226,7 +234,8 @@ def _at_limits(
 
 def _limit_fields(strides: Strides, cycles: LimitCycles, k: int) -> dict:
     """Return the fields of `Walk` that belong to the limit cycle of robot k."""
-    per_second, limit = strides.frequency[k] / strides.period, cycles.limits[k]
+    per_second = strides.frequency[k] / strides.period
+    limit = cycles.limits[k]
     stuck = abs(cycles.progress[k]) < STUCK * strides.period * strides.reach[k]
     return {
         "speed": float(cycles.progress[k] * per_second),
@@ -242,11 +251,12 @@ def _limit_fields(strides: Strides, cycles: LimitCycles, k: int) -> dict:
 
 
 def _rows(blocks, cycle: int, duration: float) -> np.ndarray:
-    """Return rows (T, 9) of t, pose, twist, work and loss until the duration, s, is over; the last ``cycle`` strides, if not
-    0, are repeated until then."""
+    """Return rows (T, 9) of t, pose, twist, work and loss until the duration, s, is
+    over; the last ``cycle`` strides, if not 0, are repeated until then."""
     rows = np.concatenate(blocks)
     if cycle:
-        last, before = np.concatenate(blocks[-cycle:]), blocks[-1 - cycle][-1]
+        last = np.concatenate(blocks[-cycle:])
+        before = blocks[-1 - cycle][-1]
         gain = np.zeros(9)
         gain[[0, 1, 7, 8]] = (last[-1] - before)[[0, 1, 7, 8]]
         repetitions = int(np.ceil((duration - rows[-1, 0]) / gain[0]))
@@ -263,7 +273,8 @@ def rerun(
     cycles: int | None = None,
     advance: Callable = compute_stride,
 ) -> list[Walk]:
-    """Return walks with other numerics; see `rft.terradynamics.walking.engines.Engine.rerun`."""
+    """Return walks with other numerics; see
+    `rft.terradynamics.walking.engines.Engine.rerun`."""
     others: list = [None] * len(walkers)
     ended = [k for k, w in enumerate(walks) if w.limit is None]
     for k, one in zip(
@@ -285,31 +296,27 @@ def rerun(
 def step_cost(
     walkers: Sequence[Walker], numerics: Fineness, seconds: float
 ) -> tuple[float, float]:
-    """Return the cost of a time step; see `rft.terradynamics.walking.engines.Engine.step_cost`."""
-    strides, robots = _strides(walkers, numerics), np.arange(len(walkers))
-    ends, state, done, tries = (
-        (strides.top, strides.out_of_reach),
-        strides.robots.start(),
-        0,
-        0,
-    )
+    """Return the cost of a time step; see
+    `rft.terradynamics.walking.engines.Engine.step_cost`."""
+    strides = _strides(walkers, numerics)
+    robots = np.arange(len(walkers))
+    ends = (strides.top, strides.out_of_reach)
+    state = strides.robots.start()
+    done = 0
+    tries = 0
 
     def steps(begin, count):
-        phases, rate_phases = (
-            strides.phases[begin : begin + count + 1],
-            strides.rate_phases[begin : begin + count],
-        )
+        phases = strides.phases[begin : begin + count + 1]
+        rate_phases = strides.rate_phases[begin : begin + count]
         return march(strides.robots, robots, state, phases, rate_phases, ends)
 
     steps(0, 1)  # compiled code is loaded
     begin = time.process_time()
     while done < len(strides.rate_phases):
         states, evaluations = steps(done, max(1, done))  # one by one they take longer
-        state, tries, done = (
-            states.take(-1),
-            tries + int(evaluations[0]),
-            done + len(states.pose),
-        )
+        state = states.take(-1)
+        tries = tries + int(evaluations[0])
+        done = done + len(states.pose)
         if (
             time.process_time() - begin >= seconds
             or strides.end_status(state, robots)[0]

@@ -1,4 +1,5 @@
-"""Robots of the vertical plane: a rigid body on legs, and the clock by which the legs rotate.
+"""Robots of the vertical plane: a rigid body on legs, and the clock by which the legs
+rotate.
 
 Signs are those of `rft.terradynamics.plates.loads`: x forwards, z up, angles and rates
 about the y axis that points away, so a positive pitch has the nose down, and a leg that
@@ -22,11 +23,13 @@ from rft.terradynamics.plates.outline import Outline
 from rft.terradynamics.plates.shapes import Polygon, Shape
 
 MOST_HIPS = 20
-SHORTEST = (
-    1 / 8
-)  # of a cycle: shorter parts get as many time steps, since all of the motion may lie in them
+# of a cycle: shorter parts get as many time steps, since all of the motion may lie in
+# them
+SHORTEST = 1 / 8
 SMALLEST = 1e-7  # m/s, least rounding
-CREEP = 0.05  # largest rounding over the speed of the legs' ends: with more, slow legs sink as they stand
+# largest rounding over the speed of the legs' ends: with more, slow legs sink as they
+# stand
+CREEP = 0.05
 
 Mass = Annotated[float, Number(1e-6, 1e4, "kg", "mass of all that moves")]
 Axle = Annotated[
@@ -40,8 +43,9 @@ Axle = Annotated[
 
 @dataclass(frozen=True)
 class Tripod:
-    """The clock of a leg (RHex): for a share ``duty`` of the cycle it rotates by ``sweep``, with the angle ``middle`` in the
-    middle of that time, for the rest by 2 pi - sweep. Angle 0 is straight down from the body. Both rates are constant; by
+    """The clock of a leg (RHex): for a share ``duty`` of the cycle it rotates by
+    ``sweep``, with the angle ``middle`` in the middle of that time, for the rest by 2
+    pi - sweep. Angle 0 is straight down from the body. Both rates are constant; by
     default they are equal.
 
     The legs at a hip differ by half a cycle.
@@ -77,7 +81,8 @@ class Tripod:
 
     @property
     def kinks(self) -> tuple[float, ...]:
-        """Phases from 0 to 0.5 at which a leg of either tripod changes its rate, with 0 and 0.5."""
+        """Phases from 0 to 0.5 at which a leg of either tripod changes its rate, with 0
+        and 0.5."""
         if abs(self.sweep - 2 * math.pi * self.duty) < 1e-12:
             return 0.0, 0.5
         first = min(self.duty, 1.0 - self.duty) / 2
@@ -88,7 +93,8 @@ class Tripod:
         )
 
     def angle(self, phase, rate_phase) -> np.ndarray:
-        """Return the angle of a leg at ``phase``, cycles, by the rate at ``rate_phase``, which tells the side of a kink."""
+        """Return the angle of a leg at ``phase``, cycles, by the rate at
+        ``rate_phase``, which tells the side of a kink."""
         return leg_angle(phase, rate_phase, self.duty, self.sweep, self.middle)
 
     def rate(self, phase) -> np.ndarray:
@@ -97,8 +103,9 @@ class Tripod:
 
 
 def intervals(kinks: Sequence[float], steps: int) -> list[tuple[float, float, int]]:
-    """Return (begin, end, number of time steps) between neighbouring kinks of a clock: about ``steps`` to a cycle, and in each
-    interval at least those of `SHORTEST`, so that half of the steps are half of them in every interval."""
+    """Return (begin, end, number of time steps) between neighbouring kinks of a clock:
+    about ``steps`` to a cycle, and in each interval at least those of `SHORTEST`, so
+    that half of the steps are half of them in every interval."""
     return [
         (a, b, max(1, round(steps * max(b - a, SHORTEST)))) for a, b in pairwise(kinks)
     ]
@@ -107,10 +114,9 @@ def intervals(kinks: Sequence[float], steps: int) -> list[tuple[float, float, in
 def leg_angle(phase, rate_phase, duty, sweep, middle) -> np.ndarray:
     """Return `Tripod.angle` of many clocks."""
     turns = np.floor(np.asarray(rate_phase) + 0.5)
-    phase, within = (
-        np.asarray(phase) - turns,
-        np.asarray(rate_phase) - turns,
-    )  # the second from -0.5 to 0.5
+    # the second from -0.5 to 0.5
+    phase = np.asarray(phase) - turns
+    within = np.asarray(rate_phase) - turns
     stance = sweep / duty * phase
     recovery = np.sign(within) * math.pi + _recovery_rate(duty, sweep) * (
         phase - np.sign(within) * 0.5
@@ -136,15 +142,16 @@ def _recovery_rate(duty, sweep):
 
 
 def walking_rounding(rounding: float, frequency, reach):
-    """Return the rounding, m/s, for legs of a reach, m, at a frequency, Hz: less than ``rounding`` for slow legs."""
+    """Return the rounding, m/s, for legs of a reach, m, at a frequency, Hz: less than
+    ``rounding`` for slow legs."""
     return np.clip(
         CREEP * 2 * math.pi * np.asarray(frequency) * reach, SMALLEST, rounding
     )
 
 
 class Robot:
-    """Base of robots. legs: shape of every leg, which rotates about its axle at a hip. inertia: kg m^2, infinite for a robot
-    that keeps its pitch.
+    """Base of robots. legs: shape of every leg, which rotates about its axle at a hip.
+    inertia: kg m^2, infinite for a robot that keeps its pitch.
 
     Examples
     --------
@@ -180,7 +187,8 @@ class Robot:
         return None
 
     def check(self, elements: int) -> None:
-        """Raise ValueError unless the robot's surfaces can have ``elements`` elements."""
+        """Raise ValueError unless the robot's surfaces can have ``elements``
+        elements."""
         self.leg(elements)
 
     def _check(self) -> None:
@@ -195,13 +203,15 @@ class Robot:
 
 @dataclass(frozen=True)
 class Rhex(Robot):
-    """A box on two legs at each hip, which differ by half a cycle and alternate from hip to hip: an alternating tripod.
+    """A box on two legs at each hip, which differ by half a cycle and alternate from
+    hip to hip: an alternating tripod.
 
     hips (m): x of each hip from the centre of mass.
 
-    aside (m): distance of the legs at each hip from the middle plane, one on either side, for the engine of three
-    dimensions. By default legs touch the box; of an odd number of hips every second one has its legs farther out, so that a
-    tripod with equal forces on its legs neither rolls nor yaws the body.
+    aside (m): distance of the legs at each hip from the middle plane, one on either
+    side, for the engine of three dimensions. By default legs touch the box; of an odd
+    number of hips every second one has its legs farther out, so that a tripod with
+    equal forces on its legs neither rolls nor yaws the body.
 
     Examples
     --------
@@ -269,12 +279,14 @@ class Rhex(Robot):
         """Distances (K,), m, of the legs at each hip from the middle plane."""
         if self.aside is not None:
             return np.array(self.aside)
-        count, near = len(self.hips), (self.width + self.legs.width) / 2
+        count = len(self.hips)
+        near = (self.width + self.legs.width) / 2
         out = (count + 1) / (count - 1) if count > 1 and count % 2 else 1.0
         return np.array([near * (out if k % 2 else 1.0) for k in range(count)])
 
     def belly(self, elements: int) -> Outline:
-        x, z = self.length / 2, self.height / 2
+        x = self.length / 2
+        z = self.height / 2
         return Polygon(((-x, -z), (x, -z), (x, z), (-x, z)), self.width).outline(
             elements
         )
@@ -282,8 +294,8 @@ class Rhex(Robot):
 
 @dataclass(frozen=True)
 class Roller(Robot):
-    """A wheel, or another rotating shape, on an axle kept level: a mass that moves forwards and up and down under its own
-    weight.
+    """A wheel, or another rotating shape, on an axle kept level: a mass that moves
+    forwards and up and down under its own weight.
 
     Examples
     --------

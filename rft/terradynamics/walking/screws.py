@@ -1,9 +1,12 @@
-"""Screws that rotate in the ground, and craft on two of them: forces in the mean over a turn, without inertia.
+"""Screws that rotate in the ground, and craft on two of them: forces in the mean over a
+turn, without inertia.
 
-A screw rotates about its axis, x, so that it drives to +x, and moves forwards at (1 - slip) rate pitch / (2 pi). The law
-depends on the direction of velocities alone, so all results hold at any rate, as an advance per turn. A craft moves steadily
-with one body velocity, height, pitch and roll, at which the mean force of the grains bears its weight and their mean moment
-about its centre of mass is zero. Changes of height and pitch within a turn are neglected; an engine computes them.
+A screw rotates about its axis, x, so that it drives to +x, and moves forwards at (1 -
+slip) rate pitch / (2 pi). The law depends on the direction of velocities alone, so all
+results hold at any rate, as an advance per turn. A craft moves steadily with one body
+velocity, height, pitch and roll, at which the mean force of the grains bears its weight
+and their mean moment about its centre of mass is zero. Changes of height and pitch
+within a turn are neglected; an engine computes them.
 """
 
 from __future__ import annotations
@@ -26,22 +29,25 @@ BALANCED = (
     1e-5  # largest residual, of the weight, and of the weight times the screws' length
 )
 EASY = 0.7  # first guess of the speed, over that without slip
-NOSE_UP = -0.03  # rad, first guess of the pitch: at 0 upright faces begin to look down all at once, and the law jumps
-ABOVE = (
-    0.3,
-    0.0,
-)  # first guesses of the height, screw radii above `_Steady.floating`: there the box touches down
+# rad, first guess of the pitch: at 0 upright faces begin to look down all at once, and
+# the law jumps
+NOSE_UP = -0.03
+# first guesses of the height, screw radii above `_Steady.floating`: there the box
+# touches down
+ABOVE = (0.3, 0.0)
 DEEPEST = 20.0  # depth of the axes that is searched, screw radii
-HALVINGS = 16  # of the interval that holds a slip; half as many of that of a height, a first guess
+# of the interval that holds a slip; half as many of that of a height, a first guess
+HALVINGS = 16
 STEPS = 30  # of Newton's method
 FARTHEST = 0.3  # step of Newton's method, in units of `_Steady`
 DIFFERENCE = 1e-3  # for slopes, in the same units
 
 
 class Turning(NamedTuple):
-    """Means over a turn of a screw, (...,) for each slip. thrust, side, lift: N, of the grains along x, y, z. torque: N m, of
-    the motor. pitching: N m, moment about y at the screw's middle, positive nose down. efficiency: thrust times speed over
-    the motor's power, nan for a screw out of the ground.
+    """Means over a turn of a screw, (...,) for each slip. thrust, side, lift: N, of the
+    grains along x, y, z. torque: N m, of the motor. pitching: N m, moment about y at
+    the screw's middle, positive nose down. efficiency: thrust times speed over the
+    motor's power, nan for a screw out of the ground.
 
     Examples
     --------
@@ -65,8 +71,9 @@ class Turning(NamedTuple):
 def turning(
     medium: Spatial, screw: Screw, height: float, slip, rate: float = 1.0, triangles: int = TRIANGLES, angles: int = ANGLES
 ) -> Turning:  # fmt: skip
-    """Return the mean forces on a level screw with its axis ``height``, m, above the surface. rate: rad/s. slip: (...,), 0 as
-    in a nut, 1 where the screw rotates without moving.
+    """Return the mean forces on a level screw with its axis ``height``, m, above the
+    surface. rate: rad/s. slip: (...,), 0 as in a nut, 1 where the screw rotates without
+    moving.
 
     Examples
     --------
@@ -81,7 +88,8 @@ def turning(
     require(bool((np.abs(slip) <= 100).all()), "slip must be within +-100", value=slip)
     in_range("height", height, -10.0, 10.0)
     in_range("rate", rate, 1e-9, 1e4)
-    sense, mesh = screw.sense, screw.mesh(triangles)
+    sense = screw.sense
+    mesh = screw.mesh(triangles)
     speed = ((1.0 - slip) * rate * screw.pitch / (2 * np.pi))[..., None]
     turns = _turns(angles)
     force, moment, _, _ = wrench(
@@ -92,7 +100,8 @@ def turning(
         speed[..., None] * [1.0, 0.0, 0.0],
         [sense * rate, 0.0, 0.0],
     )
-    force, moment = force.mean(-2), moment.mean(-2)
+    force = force.mean(-2)
+    moment = moment.mean(-2)
     torque = -sense * moment[..., 0]
     power = np.where(torque == 0.0, np.nan, torque * rate)
     return Turning(
@@ -111,8 +120,8 @@ def free_turning(
     triangles: int = TRIANGLES,
     angles: int = ANGLES,
 ) -> Turning:
-    """Return the mean forces of `turning` at the slip without thrust, where nothing pulls the screw and it pulls nothing; nan
-    where that slip is beyond 1.
+    """Return the mean forces of `turning` at the slip without thrust, where nothing
+    pulls the screw and it pulls nothing; nan where that slip is beyond 1.
 
     Examples
     --------
@@ -126,7 +135,8 @@ def free_turning(
     def forces(slip):
         return turning(medium, screw, height, slip, 1.0, triangles, angles)
 
-    low, high = 0.0, 1.0
+    low = 0.0
+    high = 1.0
     moves = forces(high).thrust > 0.0
     for _ in range(HALVINGS):
         middle = (low + high) / 2
@@ -146,10 +156,12 @@ def _turns(angles: int) -> np.ndarray:
 
 
 class Cruise(NamedTuple):
-    """Steady motion of a craft. height: m, of the centre of mass above the surface. roll, pitch: rad, about its x and the level
-    y; positive nose down. velocity: (2,), m/s, forwards and to its left. yaw_rate: rad/s, to its left. advance: m, path
-    length per turn of the screws. slip: 1 - velocity forwards over that in a nut. torque: (2,), N m, of the motors, left and
-    right. residual: of the balance, over the weight. All others are nan without a balance, as where the craft sinks.
+    """Steady motion of a craft. height: m, of the centre of mass above the surface.
+    roll, pitch: rad, about its x and the level y; positive nose down. velocity: (2,),
+    m/s, forwards and to its left. yaw_rate: rad/s, to its left. advance: m, path length
+    per turn of the screws. slip: 1 - velocity forwards over that in a nut. torque:
+    (2,), N m, of the motors, left and right. residual: of the balance, over the weight.
+    All others are nan without a balance, as where the craft sinks.
 
     Examples
     --------
@@ -180,10 +192,12 @@ def cruise(
     triangles: int = TRIANGLES,
     angles: int = ANGLES,
 ) -> Cruise:
-    """Return the steady motion of a craft on level ground whose screws turn ``frequency`` times a second.
+    """Return the steady motion of a craft on level ground whose screws turn
+    ``frequency`` times a second.
 
-    Two equal screws push a craft sideways. It has one balance where it screws forwards and drifts a little, and, if it is
-    light, another where it rolls sideways on them; the first is tried first.
+    Two equal screws push a craft sideways. It has one balance where it screws forwards
+    and drifts a little, and, if it is light, another where it rolls sideways on them;
+    the first is tried first.
 
     Examples
     --------
@@ -196,10 +210,8 @@ def cruise(
     (0.029, 0.52)
     """
     in_range("frequency", frequency, 1e-9, 1e3)
-    steady, mirrored = (
-        _Steady(medium, craft, frequency, triangles, angles),
-        craft.pair == "mirrored",
-    )
+    steady = _Steady(medium, craft, frequency, triangles, angles)
+    mirrored = craft.pair == "mirrored"
     free, equations = (
         ([0, 2, 3], [2, 4, 0]) if mirrored else ([*range(6)], [*range(6)])
     )  # the rest is 0 by symmetry
@@ -231,10 +243,8 @@ def cruise(
     height, roll, pitch, *velocity, yaw_rate = (
         float(value) for value in full(x) * steady.units
     )
-    advance, slip = (
-        float(np.hypot(*velocity)) / frequency,
-        1.0 - velocity[0] / (craft.screw.pitch * frequency),
-    )
+    advance = float(np.hypot(*velocity)) / frequency
+    slip = 1.0 - velocity[0] / (craft.screw.pitch * frequency)
     return Cruise(
         height,
         roll,
@@ -249,8 +259,9 @@ def cruise(
 
 
 class _Steady:
-    """A craft that moves steadily at q (6,): height, roll, pitch, velocity forwards and to the left, and yaw rate, in
-    ``units``: a screw's radius, radians, the velocity in a nut, and that over the screws' length."""
+    """A craft that moves steadily at q (6,): height, roll, pitch, velocity forwards and
+    to the left, and yaw rate, in ``units``: a screw's radius, radians, the velocity in
+    a nut, and that over the screws' length."""
 
     def __init__(
         self,
@@ -260,7 +271,9 @@ class _Steady:
         triangles: int,
         angles: int,
     ):
-        self.medium, self.craft, self.rate = medium, craft, 2 * np.pi * frequency
+        self.medium = medium
+        self.craft = craft
+        self.rate = 2 * np.pi * frequency
         nut = craft.screw.pitch * frequency
         self.units = np.array(
             [craft.screw.radius, 1.0, 1.0, nut, nut, nut / craft.screw.length]
@@ -269,31 +282,28 @@ class _Steady:
         self.screws = [
             (s.sense, s.mesh(triangles), np.array(place)) for s, place in craft.screws
         ]
-        self.turns, self.hull = _turns(angles), craft.hull(6)
+        self.turns = _turns(angles)
+        self.hull = craft.hull(6)
 
     def sums(self, q) -> tuple[np.ndarray, np.ndarray]:
-        """Return force and moment of the grains about the centre of mass (6,), and the motors' torques (2,), in the mean over a
-        turn."""
+        """Return force and moment of the grains about the centre of mass (6,), and the
+        motors' torques (2,), in the mean over a turn."""
         height, roll, pitch, *velocity, yaw_rate = q * self.units
         body = (
             rotations([0.0, pitch, 0.0]).as_matrix()
             @ rotations([roll, 0.0, 0.0]).as_matrix()
         )
-        velocity, spin, torques = (
-            np.array([*velocity, 0.0]),
-            np.array([0.0, 0.0, yaw_rate]),
-            [],
-        )
+        velocity = np.array([*velocity, 0.0])
+        spin = np.array([0.0, 0.0, yaw_rate])
+        torques = []
         on_hull = wrench(
             self.medium, self.hull, body, [0.0, 0.0, height], velocity, spin
         )
         total = np.concatenate([on_hull.force, on_hull.moment])
         for sense, mesh, place in self.screws:
             arm = body @ place
-            v, relative_spin = (
-                velocity + np.cross(spin, arm),
-                sense * self.rate * body[:, 0],
-            )
+            v = velocity + np.cross(spin, arm)
+            relative_spin = sense * self.rate * body[:, 0]
             on_screw = wrench(
                 self.medium,
                 mesh,
@@ -302,13 +312,15 @@ class _Steady:
                 v,
                 spin + relative_spin,
             )
-            force, moment = on_screw.force.mean(0), on_screw.moment.mean(0)
+            force = on_screw.force.mean(0)
+            moment = on_screw.moment.mean(0)
             total += [*force, *(moment + np.cross(arm, force))]
             torques.append(-sense * moment @ body[:, 0])
         return total, np.array(torques)
 
     def residual(self, q) -> np.ndarray:
-        """Return the sums with the weight (6,), over the weight, and over the weight times the screws' length."""
+        """Return the sums with the weight (6,), over the weight, and over the weight
+        times the screws' length."""
         arm = self.craft.screw.length
         scaled = self.sums(q)[0] / (
             self.weight * np.array([1.0, 1.0, 1.0, arm, arm, arm])
@@ -316,9 +328,11 @@ class _Steady:
         return scaled - np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
     def floating(self) -> float:
-        """Return the height, screw radii, at which the grains bear the craft at an easy speed, or the deepest one searched."""
+        """Return the height, screw radii, at which the grains bear the craft at an easy
+        speed, or the deepest one searched."""
         axes = self.craft.drop / self.units[0]
-        low, high = axes - DEEPEST, axes + 1.0
+        low = axes - DEEPEST
+        high = axes + 1.0
         for _ in range(HALVINGS // 2):
             middle = (low + high) / 2
             bears = (
@@ -330,7 +344,8 @@ class _Steady:
 
 
 def _solve(function, x: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return a zero of a function and the residual there, by Newton's method with differences and shortened steps."""
+    """Return a zero of a function and the residual there, by Newton's method with
+    differences and shortened steps."""
     f = function(x)
     for _ in range(STEPS):
         if np.abs(f).max() < BALANCED:
@@ -348,5 +363,6 @@ def _solve(function, x: np.ndarray) -> tuple[np.ndarray, float]:
             step = step / 2
         else:
             break
-        x, f = x + step, new
+        x = x + step
+        f = new
     return x, float(np.abs(f).max())

@@ -1,10 +1,13 @@
-"""SDIRK2 with Newton's method: one robot's time steps, stage by stage and evaluation by evaluation.
+"""SDIRK2 with Newton's method: one robot's time steps, stage by stage and evaluation by
+evaluation.
 
-The law of stress depends on the direction of a velocity alone, so it is stiff wherever something is nearly at rest. Explicit
-steps chatter there, and linearly implicit ones too, as a step may begin in slip and end in stick. So each stage is solved to
-convergence: SDIRK2 of Alexander, SIAM J. Numer. Anal. 14, 1006 (1977), of order 2, L-stable and stiffly accurate, by
-Newton's method on the three rates. Where Newton's method fails, it goes through wider roundings of the law down to the
-law's own; where this fails, too, the step is halved.
+The law of stress depends on the direction of a velocity alone, so it is stiff wherever
+something is nearly at rest. Explicit steps chatter there, and linearly implicit ones
+too, as a step may begin in slip and end in stick. So each stage is solved to
+convergence: SDIRK2 of Alexander, SIAM J. Numer. Anal. 14, 1006 (1977), of order 2,
+L-stable and stiffly accurate, by Newton's method on the three rates. Where Newton's
+method fails, it goes through wider roundings of the law down to the law's own; where
+this fails, too, the step is halved.
 
 All functions are formulas (`rft.formulas.vectors`): `rft.terradynamics.walking.march`
 takes many robots through them side by side by NumPy,
@@ -30,8 +33,9 @@ LEAST_DECREASE = 0.1  # of the residual, over the decrease that Newton's method 
 
 
 class Effort(NamedTuple):
-    """Limits of the work on a stage. widths: (W, 1), factors of the rounding, one after another until the stage is solved
-    at the first or last, which are 1. iterations: of Newton's method at a width. smallest: part of a step."""
+    """Limits of the work on a stage. widths: (W, 1), factors of the rounding, one after
+    another until the stage is solved at the first or last, which are 1. iterations: of
+    Newton's method at a width. smallest: part of a step."""
 
     widths: np.ndarray
     iterations: float
@@ -44,7 +48,8 @@ EFFORT = Effort(
 
 
 class Accepted(NamedTuple):
-    """State at the start of the present part of a step, with the fields of `rft.terradynamics.walking.planar.State`."""
+    """State at the start of the present part of a step, with the fields of
+    `rft.terradynamics.walking.planar.State`."""
 
     pose: tuple[float, float, float]
     twist: tuple[float, float, float]
@@ -58,9 +63,10 @@ class Accepted(NamedTuple):
 class Stage(NamedTuple):
     """A stage of a part of a step: v = start + k a(base + k v, v).
 
-    part, elapsed: the present part, and the sum of those before it, over the step. second: 0 at the first stage, 1 at the
-    second. base, start: triples of the equation. guess: first trial for v. first: power of the motors and into the ground,
-    W, and residual, m/s, at the end of the first stage."""
+    part, elapsed: the present part, and the sum of those before it, over the step.
+    second: 0 at the first stage, 1 at the second. base, start: triples of the equation.
+    guess: first trial for v. first: power of the motors and into the ground, W, and
+    residual, m/s, at the end of the first stage."""
 
     part: float
     elapsed: float
@@ -74,9 +80,10 @@ class Stage(NamedTuple):
 class Newton(NamedTuple):
     """Newton's method for a stage at one rounding.
 
-    width: index of the rounding in `Effort.widths`. tries: evaluations at it. best: of all v tried, that of the smallest
-    ``residual``, m/s. power: of the motors and into the ground, W, at the best v. step: Newton's step from there. trial: v
-    to be tried next, a ``share`` of the step from the best. largest: first share that is tried."""
+    width: index of the rounding in `Effort.widths`. tries: evaluations at it. best: of
+    all v tried, that of the smallest ``residual``, m/s. power: of the motors and into
+    the ground, W, at the best v. step: Newton's step from there. trial: v to be tried
+    next, a ``share`` of the step from the best. largest: first share that is tried."""
 
     width: float
     tries: float
@@ -101,7 +108,8 @@ class Step(NamedTuple):
 def start_of_step(pose, twist, work, loss, unsolved, defect, residual):
     """Return a robot in a state at the start of a time step."""
     zero = 0.0 * work
-    one, none = zero + 1.0, (zero, zero, zero)
+    one = zero + 1.0
+    none = (zero, zero, zero)
     return Step(
         Accepted(pose, twist, work, loss, unsolved, defect, residual),
         Stage(one, zero, zero, pose, twist, twist, none),
@@ -133,9 +141,11 @@ def stage_time(stage):
 
 @formula
 def newton_step(newton, residual, slopes, power, k, reach, tolerance, effort):
-    """Return Newton's method after an evaluation at its trial, whether the stage is solved, and whether the method failed.
+    """Return Newton's method after an evaluation at its trial, whether the stage is
+    solved, and whether the method failed.
 
-    residual: a triple, m/s. slopes: of the residual, three columns. tolerance: of the residual, m/s."""
+    residual: a triple, m/s. slopes: of the residual, three columns. tolerance: of the
+    residual, m/s."""
     # Not a number where any of the three is not.
     size = largest_speed(residual, reach) + 0.0 * (
         residual[0] + residual[1] + residual[2]
@@ -145,15 +155,14 @@ def newton_step(newton, residual, slopes, power, k, reach, tolerance, effort):
     step = pick(better, (-x, -z, -pitch), newton.step)
     longest = 1.0 / maximum(1.0, largest_speed(step, reach) * k / (FARTHEST * reach))
     largest = where(better, longest, newton.largest)
-    share, best = (
-        where(better, largest, 0.5 * newton.share),
-        pick(better, newton.trial, newton.best),
-    )
+    share = where(better, largest, 0.5 * newton.share)
+    best = pick(better, newton.trial, newton.best)
     power = (
         where(better, power[0], newton.power[0]),
         where(better, power[1], newton.power[1]),
     )
-    tries, size = newton.tries + 1.0, where(better, size, newton.residual)
+    tries = newton.tries + 1.0
+    size = where(better, size, newton.residual)
     solved = better & (size <= tolerance)
     failed = (where(solved, np.inf, share) <= LEAST_SHARE * largest) | (
         where(solved, 0.0, tries) >= effort.iterations
@@ -168,7 +177,8 @@ def newton_step(newton, residual, slopes, power, k, reach, tolerance, effort):
 
 @formula
 def end_of_part(old, stage, newton, ended, tolerance, k, h):
-    """Return the accepted state after a part of a step, h s long, that has ended, or the old one."""
+    """Return the accepted state after a part of a step, h s long, that has ended, or
+    the old one."""
     unsolved = where(newton.residual > tolerance, newton.residual, 0.0)
     unsolved = unsolved + where(stage.first[2] > tolerance, stage.first[2], 0.0)
     work = h * (1.0 - GAMMA) * stage.first[0] + k * newton.power[0]
@@ -190,7 +200,8 @@ def end_of_part(old, stage, newton, ended, tolerance, k, h):
 
 @formula
 def next_part(stage, ended, halved):
-    """Return the part of the step that comes next, the sum of those before it, and whether the step is over."""
+    """Return the part of the step that comes next, the sum of those before it, and
+    whether the step is over."""
     elapsed = stage.elapsed + where(ended, stage.part, 0.0)
     part = where(halved, 0.5 * stage.part, stage.part)
     for _ in range(HALVINGS):  # two halves join
@@ -202,18 +213,21 @@ def next_part(stage, ended, halved):
 
 @formula
 def next_problem(step, solved, failed, tolerance, k, h, effort):
-    """Return a robot with the next rounding, stage or part of a step to solve where Newton's method has solved a stage or
-    failed, and whether the time step is over; elsewhere the robot as it is. h: s, of the present part of the step."""
-    old, stage, newton = step.accepted, step.stage, step.newton
-    at_last, at_first = newton.width >= len(effort.widths) - 1.0, newton.width <= 0.0
+    """Return a robot with the next rounding, stage or part of a step to solve where
+    Newton's method has solved a stage or failed, and whether the time step is over;
+    elsewhere the robot as it is. h: s, of the present part of the step."""
+    old = step.accepted
+    stage = step.stage
+    newton = step.newton
+    at_last = newton.width >= len(effort.widths) - 1.0
+    at_first = newton.width <= 0.0
     ready = (solved & (at_first | at_last)) | (
         failed & at_last & (stage.part <= effort.smallest)
     )
-    halved, next_width = (
-        where(ready, False, failed & at_last),
-        where(ready | at_last, False, solved | failed),
-    )
-    second, ended = ready & (stage.second <= 0.0), ready & (stage.second > 0.0)
+    halved = where(ready, False, failed & at_last)
+    next_width = where(ready | at_last, False, solved | failed)
+    second = ready & (stage.second <= 0.0)
+    ended = ready & (stage.second > 0.0)
     restarts = ended | halved
 
     accepted = end_of_part(old, stage, newton, ended, tolerance, k, h)
@@ -256,5 +270,6 @@ def next_problem(step, solved, failed, tolerance, k, h, effort):
 
 @formula
 def has_ended(z, pitch, ends):
-    """Return whether a robot has sunk, -z above the first of ``ends``, is airborne, z above the second, or flipped."""
+    """Return whether a robot has sunk, -z above the first of ``ends``, is airborne, z
+    above the second, or flipped."""
     return (z + ends[0] < 0.0) | (z > ends[1]) | (absolute(pitch) > 0.5 * np.pi)

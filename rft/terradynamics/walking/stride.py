@@ -12,18 +12,24 @@ from rft.terradynamics.walking.march import march
 from rft.terradynamics.walking.planar import Robots, State
 from rft.terradynamics.walking.robot import Robot, Tripod, intervals
 
-# A cycle is periodic where its start differs from the last one's, and from all to come, by at most this share of the speed of
-# the legs' ends, or of the speed of a fall that lasts a cycle if that is less.
+# A cycle is periodic where its start differs from the last one's, and from all to come,
+# by at most this share of the speed of the legs' ends, or of the speed of a fall that
+# lasts a cycle if that is less.
 PERIODIC = 1e-3
-SETTLED = 1e-3  # largest change, in all, of a cycle's progress still to come at the limit, over a leg's reach
+# largest change, in all, of a cycle's progress still to come at the limit, over a leg's
+# reach
+SETTLED = 1e-3
 MOST_STRIDES = 10  # on the way to the limit cycle
 FEW_STRIDES = 4  # on the way to the limit cycle from a state near it
 LAST_CYCLES = 4  # of a walk without a limit cycle, whose mean is its speed
 LIMPING = (
     0.5  # change over two strides over that of one stride, below which a robot limps
 )
-STUCK = 0.02  # progress in a cycle over a leg's reach, below which a robot is stuck, assumed
-NEAR = 0.05  # largest difference of a settled cycle's progress from that of the limit cycle, over the latter
+# progress in a cycle over a leg's reach, below which a robot is stuck, assumed
+STUCK = 0.02
+# largest difference of a settled cycle's progress from that of the limit cycle, over
+# the latter
+NEAR = 0.05
 
 
 class Walk(NamedTuple):
@@ -36,9 +42,11 @@ class Walk(NamedTuple):
     pose, twist : array (T, 3)
         x, z and pitch, and their rates; SI units.
     work, loss, energy : array (T,)
-        Work of the motors, loss into the ground and energy of the body, J; work = loss + change of energy.
+        Work of the motors, loss into the ground and energy of the body, J; work = loss
+        + change of energy.
     speed : float
-        Mean over the limit cycle, or until the robot's end, m/s, along the heading at a cycle's start.
+        Mean over the limit cycle, or until the robot's end, m/s, along the heading at a
+        cycle's start.
     status : str
         "walking", "stuck", "sunk", "flipped" or "airborne".
     cycles : float
@@ -48,7 +56,8 @@ class Walk(NamedTuple):
     drift : float
         Change of the speed that may still come, m/s.
     limit
-        State at the limit cycle, for `rft.terradynamics.walking.engines.Engine.rerun`; None for a robot that came to an end.
+        State at the limit cycle, for `rft.terradynamics.walking.engines.Engine.rerun`;
+        None for a robot that came to an end.
     unsolved : int
         Number of steps that were accepted unsolved.
     residual : float
@@ -56,13 +65,15 @@ class Walk(NamedTuple):
     unsolved_error : float
         Change of the speed by the unsolved steps, m/s, at most.
     spatial : mapping, optional
-        In three dimensions y (m), roll and yaw (rad), (T,), and "states" (T, nq), MuJoCo's positions.
+        In three dimensions y (m), roll and yaw (rad), (T,), and "states" (T, nq),
+        MuJoCo's positions.
     settling_time : float
-        Time from rest, s, after which the progress of every cycle is within `NEAR` of the limit cycle's; inf for a robot
-        that never settles, nan without a limit cycle.
+        Time from rest, s, after which the progress of every cycle is within `NEAR` of
+        the limit cycle's; inf for a robot that never settles, nan without a limit
+        cycle.
     lateral_speed, yaw_rate : float
-        Mean velocity to the left of the heading at a cycle's start, m/s, and rate to the left, rad/s, over the same time
-        as the speed; 0 in the plane.
+        Mean velocity to the left of the heading at a cycle's start, m/s, and rate to
+        the left, rad/s, over the same time as the speed; 0 in the plane.
 
     Examples
     --------
@@ -96,23 +107,25 @@ class Walk(NamedTuple):
 
     @property
     def unaccounted(self) -> float:
-        """Share of the motors' work that is neither loss nor energy: an error of the time steps."""
+        """Share of the motors' work that is neither loss nor energy: an error of the
+        time steps."""
         difference = self.work[-1] - self.loss[-1] - self.energy[-1] + self.energy[0]
         return float(abs(difference) / self.work[-1]) if self.work[-1] > 0.0 else 0.0
 
 
 def compute_stride(stride: Callable, *arguments) -> Any:
-    """Return stride(*arguments), the states of a stride. A function in its place may store the states of strides, and
-    return stored ones."""
+    """Return stride(*arguments), the states of a stride. A function in its place may
+    store the states of strides, and return stored ones."""
     return stride(*arguments)
 
 
 class Strides:
-    """Strides of B robots with clocks that have their kinks at the same phases. Where two legs at a hip differ by half a
-    cycle, a stride is half a cycle, since in the plane the legs are equal.
+    """Strides of B robots with clocks that have their kinks at the same phases. Where
+    two legs at a hip differ by half a cycle, a stride is half a cycle, since in the
+    plane the legs are equal.
 
-    designs: the `Robot` of each of ``robots``. steps: about as many to a cycle. advance: computes a stride, as
-    `compute_stride`."""
+    designs: the `Robot` of each of ``robots``. steps: about as many to a cycle.
+    advance: computes a stride, as `compute_stride`."""
 
     def __init__(
         self,
@@ -123,12 +136,11 @@ class Strides:
         advance=compute_stride,
     ):
         self.advance = advance
-        self.robots, self.period = (
-            robots,
-            designs[0].period / len(designs[0].hip_phases),
-        )
+        self.robots = robots
+        self.period = designs[0].period / len(designs[0].hip_phases)
         self.cycle = round(1 / self.period)  # strides
-        self.frequency, self.reach = robots.frequency[:, 0], robots.reach
+        self.frequency = robots.frequency[:, 0]
+        self.reach = robots.reach
         self.leg_speed = (
             2 * np.pi * self.frequency * self.reach
         )  # of the legs' ends, m/s
@@ -153,8 +165,8 @@ class Strides:
     def run(
         self, state: State, stride: int, index: np.ndarray
     ) -> tuple[np.ndarray, State]:
-        """Return phases (S,), cycles, and states (S, B) after each step of a stride of the robots ``index`` from a state; a
-        robot at an end stays there."""
+        """Return phases (S,), cycles, and states (S, B) after each step of a stride of
+        the robots ``index`` from a state; a robot at an end stays there."""
         return stride * self.period + self.phases[1:], self.advance(
             self.states, stride, index, state
         )
@@ -173,7 +185,8 @@ class Strides:
         )[0]
 
     def scaled(self, state: State, index) -> np.ndarray:
-        """Return height, pitch and rates (n, B), those that can change, over their scales for the robots ``index``."""
+        """Return height, pitch and rates (n, B), those that can change, over their
+        scales for the robots ``index``."""
         return (
             np.concatenate([state.pose[:, 1:], state.twist], 1).T[self.free]
             / self.scale[self.free][:, index]
@@ -188,8 +201,10 @@ class Strides:
         )
 
     def end_status(self, state: State, index) -> np.ndarray:
-        """Return "sunk", "airborne" or "flipped" (B,) for robots that are at an end, "" for the others."""
-        z, pitch = state.pose[:, 1], np.abs(state.pose[:, 2])
+        """Return "sunk", "airborne" or "flipped" (B,) for robots that are at an end, ""
+        for the others."""
+        z = state.pose[:, 1]
+        pitch = np.abs(state.pose[:, 2])
         status = np.where(
             z + self.top[index] < 0.0,
             "sunk",
@@ -199,8 +214,8 @@ class Strides:
 
 
 def cycles_to_settle(moves, limit: float) -> float:
-    """Return the number of cycles after which the progress of all, moves (N,), m, is within `NEAR` of the limit, m; inf if
-    the last is not."""
+    """Return the number of cycles after which the progress of all, moves (N,), m, is
+    within `NEAR` of the limit, m; inf if the last is not."""
     far = np.flatnonzero(~(np.abs(np.asarray(moves) - limit) <= NEAR * abs(limit)))
     after = far[-1] + 1 if far.size else 0
     return float(after) if after < len(moves) else np.inf
@@ -212,9 +227,11 @@ def _kinks_of_cycle(kinks: tuple[float, ...]) -> tuple[float, ...]:
 
 
 class FromRest(NamedTuple):
-    """Walks of B robots from rest. state: at the end. blocks: for each robot rows (T, 9) of t, pose, twist, work and loss, a
-    block for each stride. strides: (B,), computed. status: (B,), "periodic" where all further cycles repeat the last one,
-    as of `Strides.end_status` for a robot at an end, else "". period: (B,), as of `map_period`."""
+    """Walks of B robots from rest. state: at the end. blocks: for each robot rows
+    (T, 9) of t, pose, twist, work and loss, a block for each stride. strides: (B,),
+    computed. status: (B,), "periodic" where all further cycles repeat the last one, as
+    of `Strides.end_status` for a robot at an end, else "". period: (B,), as of
+    `map_period`."""
 
     state: State
     blocks: list[list[np.ndarray]]
@@ -226,17 +243,18 @@ class FromRest(NamedTuple):
 def from_rest(
     strides: Strides, durations: np.ndarray, progress: Callable = lambda fraction: None
 ) -> FromRest:
-    """Return the walks of robots from rest until a cycle repeats itself, the robot is at an end, or its duration (B,), s, is
-    over. progress: receives the finished fraction."""
-    count, state = len(strides.robots), strides.robots.start()
+    """Return the walks of robots from rest until a cycle repeats itself, the robot is
+    at an end, or its duration (B,), s, is over. progress: receives the finished
+    fraction."""
+    count = len(strides.robots)
+    state = strides.robots.start()
     blocks = [[_rows(np.zeros(1), state.take([[k]]), 0)] for k in range(count)]
     most = np.ceil(durations * strides.frequency / strides.period - 1e-9).astype(int)
-    computed, status, active = (
-        np.zeros(count, int),
-        np.full(count, "", "U10"),
-        np.arange(count),
-    )
-    starts, period = [strides.scaled(state, active)] * 5, np.ones(count, int)
+    computed = np.zeros(count, int)
+    status = np.full(count, "", "U10")
+    active = np.arange(count)
+    starts = [strides.scaled(state, active)] * 5
+    period = np.ones(count, int)
     # Rates count over the speed of a fall for a cycle where the legs are faster.
     weight = np.where(
         strides.free[:, None] >= 2,
@@ -270,11 +288,13 @@ def from_rest(
 
 
 def remaining_change(change, before, cycles) -> np.ndarray:
-    """Return the change (B,) of the starts of cycles that may still come, from the last change and the one before, (n, B).
+    """Return the change (B,) of the starts of cycles that may still come, from the last
+    change and the one before, (n, B).
 
-    It is the sum of a geometric series with the ratio of the two, but at most ``cycles`` (B,) times the last change, and at
-    least the last change."""
-    now, then = np.abs(change).max(0), np.abs(before).max(0)
+    It is the sum of a geometric series with the ratio of the two, but at most
+    ``cycles`` (B,) times the last change, and at least the last change."""
+    now = np.abs(change).max(0)
+    then = np.abs(before).max(0)
     shrinks = now < then
     series = np.where(
         shrinks,
@@ -285,9 +305,10 @@ def remaining_change(change, before, cycles) -> np.ndarray:
 
 
 def map_period(before, last, now) -> np.ndarray:
-    """Return the number (B,) of strides after which a walk repeats itself, 2 for robots that limp, else 1, from the scaled
-    starts (n, B) of three strides."""
-    one, two = np.abs(now - last).max(0), np.abs(now - before).max(0)
+    """Return the number (B,) of strides after which a walk repeats itself, 2 for robots
+    that limp, else 1, from the scaled starts (n, B) of three strides."""
+    one = np.abs(now - last).max(0)
+    two = np.abs(now - before).max(0)
     return np.where((one > PERIODIC) & (two < LIMPING * one), 2, 1)
 
 

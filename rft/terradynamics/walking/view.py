@@ -1,4 +1,5 @@
-"""Views of a walk in three dimensions: triangles for any drawing, and pictures by MuJoCo where there is a GL."""
+"""Views of a walk in three dimensions: triangles for any drawing, and pictures by
+MuJoCo where there is a GL."""
 
 from __future__ import annotations
 
@@ -12,20 +13,19 @@ from rft.terradynamics.walking.engines import Fineness, Walker
 from rft.terradynamics.walking.machine import machine
 
 SAND = (0.80, 0.65, 0.45, 0.75)  # red, green, blue and opacity
-LINE, LINES = (
-    (0.55, 0.42, 0.28, 1.0),
-    8,
-)  # colour of lines across the surface, and their number to either side
-AZIMUTH, ELEVATION, DISTANCE = (
-    65.0,
-    -18.0,
-    2.0,
-)  # of the camera: degrees, degrees, and sizes of the robot
+# colour of lines across the surface, and their number to either side
+LINE = (0.55, 0.42, 0.28, 1.0)
+LINES = 8
+# of the camera: degrees, degrees, and sizes of the robot
+AZIMUTH = 65.0
+ELEVATION = -18.0
+DISTANCE = 2.0
 
 
 class View:
-    """View of one walker. groups: (T,), of each triangle: 0 for the body that walks, 1 or 2 for the other bodies, by the phases
-    of the actuators where there is one for each of these bodies."""
+    """View of one walker. groups: (T,), of each triangle: 0 for the body that walks, 1
+    or 2 for the other bodies, by the phases of the actuators where there is one for
+    each of these bodies."""
 
     def __init__(self, walker: Walker, numerics: Fineness):
         self.machine = machine(walker.robot, numerics.elements)
@@ -48,7 +48,8 @@ class View:
         """Return the triangles (T, 3, 3) in the world, m, at positions (nq,)."""
         self.data.qpos[:] = state
         mujoco.mj_kinematics(self.machine.model, self.data)
-        place, rotation = self.data.xpos, self.data.xmat.reshape(-1, 3, 3)
+        place = self.data.xpos
+        rotation = self.data.xmat.reshape(-1, 3, 3)
         return np.concatenate(
             [
                 s.corners @ rotation[s.body].T + place[s.body]
@@ -59,13 +60,12 @@ class View:
     def pictures(
         self, states: np.ndarray, wide: int = 640, tall: int = 360
     ) -> Iterator[np.ndarray] | None:
-        """Return pictures (tall, wide, 3), bytes, at positions (N, nq); None where MuJoCo cannot draw."""
+        """Return pictures (tall, wide, 3), bytes, at positions (N, nq); None where
+        MuJoCo cannot draw."""
         model = self.machine.model
         buffer = model.vis.global_
-        buffer.offwidth, buffer.offheight = (
-            max(wide, buffer.offwidth),
-            max(tall, buffer.offheight),
-        )
+        buffer.offwidth = max(wide, buffer.offwidth)
+        buffer.offheight = max(tall, buffer.offheight)
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
@@ -76,15 +76,11 @@ class View:
 
     def _pictures(self, renderer, states: np.ndarray) -> Iterator[np.ndarray]:
         """Yield the pictures of `pictures`, the camera beside the body that walks."""
-        camera, size = (
-            mujoco.MjvCamera(),
-            float(np.ptp(self.triangles(states[0]).reshape(-1, 3), axis=0).max()),
-        )
-        camera.azimuth, camera.elevation, camera.distance = (
-            AZIMUTH,
-            ELEVATION,
-            DISTANCE * size,
-        )
+        camera = mujoco.MjvCamera()
+        size = float(np.ptp(self.triangles(states[0]).reshape(-1, 3), axis=0).max())
+        camera.azimuth = AZIMUTH
+        camera.elevation = ELEVATION
+        camera.distance = DISTANCE * size
         with renderer:
             for state in states:
                 self.data.qpos[:] = state
@@ -96,13 +92,15 @@ class View:
 
 
 class _Renderer(mujoco.Renderer):
-    """MuJoCo's renderer with contexts that always exist: before 4.0 it closes them even where there is no GL, and fails."""
+    """MuJoCo's renderer with contexts that always exist: before 4.0 it closes them even
+    where there is no GL, and fails."""
 
     _gl_context = _mjr_context = None
 
 
 def _add_sand(scene, place, size: float) -> None:
-    """Add the surface about a place to a scene, with a line across it every ``size``, m, which shows its motion."""
+    """Add the surface about a place to a scene, with a line across it every ``size``,
+    m, which shows its motion."""
     lines = size * (np.round(place[0] / size) + np.arange(-LINES, LINES + 1))
     width = 0.01 * size
     parts = [
@@ -114,7 +112,8 @@ def _add_sand(scene, place, size: float) -> None:
     ]
     for kind, sizes, x, colour in parts:
         if scene.ngeom < scene.maxgeom:
-            geom, centre = scene.geoms[scene.ngeom], np.array([x, place[1], 0.0])
+            geom = scene.geoms[scene.ngeom]
+            centre = np.array([x, place[1], 0.0])
             mujoco.mjv_initGeom(
                 geom,
                 kind,

@@ -19,8 +19,9 @@ ANGLES = 24  # of a turn of a wheel that is not round
 
 
 class Rolling(NamedTuple):
-    """Rolling of a wheel, (...,) for each slip. sinkage: m, of the lowest point. pull: N, of the drawbar, the net force of the
-    grains forwards. torque: N m, of the axle. carried: whether the ground bears the load; where not, the others are nan.
+    """Rolling of a wheel, (...,) for each slip. sinkage: m, of the lowest point. pull:
+    N, of the drawbar, the net force of the grains forwards. torque: N m, of the axle.
+    carried: whether the ground bears the load; where not, the others are nan.
 
     Examples
     --------
@@ -42,11 +43,12 @@ def rolling(
     stress: PlateStress, wheel: Shape, load: float, rate: float, slip, effects: Sequence[GroundEffect] = (),
     radius: float | None = None, elements: int = 100,
 ) -> Rolling:  # fmt: skip
-    """Return the rolling of a wheel under ``load``, N, that rotates at ``rate``, rad/s, and moves level at
-    (1 - slip) rate radius.
+    """Return the rolling of a wheel under ``load``, N, that rotates at ``rate``, rad/s,
+    and moves level at (1 - slip) rate radius.
 
-    At the hub's height the grains bear the load, in the mean over a turn for a wheel with lugs. radius: m, by default the
-    wheel's own. slip: (...,), 0 for pure rolling, 1 for a wheel that rotates without moving, below 0 for braking.
+    At the hub's height the grains bear the load, in the mean over a turn for a wheel
+    with lugs. radius: m, by default the wheel's own. slip: (...,), 0 for pure rolling,
+    1 for a wheel that rotates without moving, below 0 for braking.
 
     Examples
     --------
@@ -56,7 +58,8 @@ def rolling(
     >>> wheel.carried, bool(wheel.pull[1] > wheel.pull[0])
     (array([ True,  True]), True)
     """
-    slip, points = real_array("slip", slip), wheel.outline(elements)
+    slip = real_array("slip", slip)
+    points = wheel.outline(elements)
     radius = getattr(wheel, "radius", None) if radius is None else radius
     require(
         radius is not None,
@@ -82,12 +85,14 @@ def rolling(
         )
         return force.mean(-2), moment.mean(-1)
 
-    low, high = np.full(slip.shape, -2 * reach), np.full(slip.shape, reach)
+    low = np.full(slip.shape, -2 * reach)
+    high = np.full(slip.shape, reach)
     carried = mean_loads(low)[0][..., 1] >= load
     for _ in range(HALVINGS):
         middle = (low + high) / 2
         bears = mean_loads(middle)[0][..., 1] >= load
-        low, high = np.where(bears, middle, low), np.where(bears, high, middle)
+        low = np.where(bears, middle, low)
+        high = np.where(bears, high, middle)
     height = (low + high) / 2
     force, moment = mean_loads(height)
     numbers = reach - height, force[..., 0], -moment
