@@ -63,18 +63,21 @@ class Screws(Robot):
             f"pair must be one of {', '.join(PAIRS)}",
             value=self.pair,
         )
-        message = f"screws of radius {self.screw.radius:g} m meet: track must be more than {2 * self.screw.radius:g} m"
-        require(self.track > 2 * self.screw.radius, message)
+        radius = self.screw.radius
+        require(
+            self.track > 2 * radius,
+            f"screws of radius {radius:g} m meet: track must be more than "
+            f"{2 * radius:g} m",
+        )
 
     @property
     def screws(self) -> tuple[tuple[Screw, tuple[float, float, float]], ...]:
         """The left and the right screw, each with its middle from the centre of mass,
         m."""
+        y = self.track / 2
+        z = -self.drop
         right = self.screw.mirrored if self.pair == "mirrored" else self.screw
-        return (self.screw, (0.0, self.track / 2, -self.drop)), (
-            right,
-            (0.0, -self.track / 2, -self.drop),
-        )
+        return (self.screw, (0.0, y, z)), (right, (0.0, -y, z))
 
     @property
     def inertia(self) -> np.ndarray:
