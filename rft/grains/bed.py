@@ -149,10 +149,11 @@ class Bed:
             points = np.column_stack([layer, np.full(len(layer), height)])
             points += rng.uniform(-JITTER / 2, JITTER / 2, points.shape) * self.diameter
             near = tree.query_ball_point(points, radius.max() + largest)
-            is_clear = [
-                bool((_distances(tree.data[some], point) > distance[some]).all())
-                for point, some in zip(points, near)
-            ]
+            point = np.repeat(np.arange(len(points)), [len(some) for some in near])
+            sphere = np.concatenate(near).astype(int)
+            gap = np.linalg.norm(points[point] - tree.data[sphere], axis=1)
+            is_clear = np.ones(len(points), bool)
+            is_clear[point[gap <= distance[sphere]]] = False
             layers.append(points[is_clear])
             count += len(layers[-1])
             height += pitch
@@ -179,8 +180,3 @@ class Bed:
             return np.zeros((1, 3))
         shifts = [(i, j, 0.0) for i in (-1, 0, 1) for j in (-1, 0, 1)]
         return np.array(shifts) * [self.length, self.width, 0.0]
-
-
-def _distances(points: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """Return the distances (n,) of points (n, 3) from one."""
-    return np.linalg.norm(points - point, axis=1)

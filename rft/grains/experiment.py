@@ -717,7 +717,9 @@ def _state_file(place: Path, block: int) -> Path:
 
 def _digest(path: Path) -> str:
     """Return the digest of a file, "" if it is not there."""
-    return hashlib.sha256(path.read_bytes()).hexdigest() if path.exists() else ""
+    if not path.exists():
+        return ""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _read_rows(place: Path, block: int) -> Block:

@@ -112,8 +112,8 @@ class Elements:
     number of its leg, that of the belly after all legs. side: (P,), as in
     `rft.terradynamics.plates.contact.load`. closed: (P,), 1 for a closed outline, 0 for
     a sheet. hips: (2, B, legs), x and z from the centre of mass, m; kept for each part,
-    (2, B, P). span: (B,), m, largest distance of an element from the centre of mass, at
-    least."""
+    (2, B, P). span: (B,), m, bound of the distance of elements from the centre of
+    mass."""
 
     def __init__(
         self,

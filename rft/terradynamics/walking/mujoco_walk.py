@@ -342,7 +342,9 @@ class Simulation:
         late = moves[-1:]
         if not is_periodic:
             late = moves[-AVERAGED_CYCLES:]
-            drift = np.ptp(late[:, 0]) if len(late) > 1 else abs(late[0, 0])
+            progress = late[:, 0]
+            # A single stride may still change by all of its progress.
+            drift = np.ptp(progress) if len(late) > 1 else abs(progress[0])
         is_stuck = abs(late[:, 0].mean()) < STUCK * self.reach
         status = "stuck" if is_stuck else "walking"
         f = self.gait.frequency
@@ -549,7 +551,9 @@ class _Record:
         positions = np.array(self.positions)
         if duration is None:
             return rows, positions
-        steps = len(rows) - 1 - self.last_stride if self.is_periodic else 0
+        steps = 0
+        if self.is_periodic:
+            steps = len(rows) - 1 - self.last_stride
         return _rows_until(duration, rows, positions, steps)
 
 

@@ -143,11 +143,11 @@ def _walk_batch(
         durations = cycles / strides.frequency
     else:
         durations = np.full(len(walkers), numerics.duration)
-    rest = walk_from_rest(strides, durations, progress)
+    from_rest = walk_from_rest(strides, durations, progress)
 
     # Robots that are at no end go on from where they are to their limit cycles.
-    walking = np.flatnonzero(np.isin(rest.status, ("", "periodic")))
-    limits = [Limit(rest.state.take([k]), rest.period[k]) for k in walking]
+    walking = np.flatnonzero(np.isin(from_rest.status, ("", "periodic")))
+    limits = [Limit(from_rest.state.take([k]), from_rest.period[k]) for k in walking]
     limit_fields = {}
     if walking.size:
         members = [walkers[k] for k in walking]
@@ -156,21 +156,23 @@ def _walk_batch(
 
     walks = []
     for k in range(len(walkers)):
-        one = _walk_until(strides, rest, k, durations[k])
+        one = _walk_until(strides, from_rest, k, durations[k])
         one = one._replace(**limit_fields.get(k, {}))
         if one.periodic and one.status == "walking":
-            settling_time = _settling_time(strides, rest, k, one)
+            settling_time = _settling_time(strides, from_rest, k, one)
             one = one._replace(settling_time=settling_time)
-        from_rest = rest.strides[k] * strides.period
-        walks.append(one._replace(cycles=one.cycles + from_rest))
+        cycles_from_rest = from_rest.strides[k] * strides.period
+        walks.append(one._replace(cycles=one.cycles + cycles_from_rest))
     return walks
 
 
-def _walk_until(strides: Strides, rest: WalksFromRest, k: int, duration: float) -> Walk:
+def _walk_until(
+    strides: Strides, from_rest: WalksFromRest, k: int, duration: float
+) -> Walk:
     """Return the walk of robot k from rest until a duration, s, without its limit
     cycle."""
-    repeated = strides.cycle if rest.status[k] == "periodic" else 0
-    rows = _rows_until(rest.blocks[k], repeated, duration)
+    repeated = strides.cycle if from_rest.status[k] == "periodic" else 0
+    rows = _rows_until(from_rest.blocks[k], repeated, duration)
     t = rows[:, 0]
     zeros = np.zeros((3, len(rows)))
     states = State(rows[:, 1:4], rows[:, 4:7], rows[:, 7], rows[:, 8], *zeros)
@@ -185,28 +187,30 @@ def _walk_until(strides: Strides, rest: WalksFromRest, k: int, duration: float) 
         states.loss,
         strides.robots.energy(states, k),
         speed=float(speed),
-        status=str(rest.status[k]),
+        status=str(from_rest.status[k]),
         cycles=0.0,
         periodic=False,
         drift=0.0,
         limit=None,
-        unsolved=int(rest.state.unsolved[k]),
-        residual=float(rest.state.residual[k]),
+        unsolved=int(from_rest.state.unsolved[k]),
+        residual=float(from_rest.state.residual[k]),
     )
 
 
-def _settling_time(strides: Strides, rest: WalksFromRest, k: int, walk: Walk) -> float:
+def _settling_time(
+    strides: Strides, from_rest: WalksFromRest, k: int, walk: Walk
+) -> float:
     """Return `Walk.settling_time` of robot k, from the ends of its strides from
     rest."""
     cycle = 1.0 / strides.frequency[k]
-    x = [block[-1, 1] for block in rest.blocks[k]]
-    if rest.status[k] == "":
+    x = [block[-1, 1] for block in from_rest.blocks[k]]
+    if from_rest.status[k] == "":
         # The strides do not repeat themselves yet: the slopes at the limit predict
         # further ones.
         moves = predicted_progress(
             strides,
             walk.limit,
-            rest.state.take([k]),
+            from_rest.state.take([k]),
             k,
             walk.speed * cycle / strides.cycle,
         )
@@ -282,9 +286,9 @@ def rerun(
     for k, one in zip(ended, new_walks):
         others[k] = one
 
-    rest = [k for k, w in enumerate(walks) if w.limit is not None]
-    for batch in _batches([walkers[k] for k in rest], numerics):
-        members = [rest[m] for m in batch]
+    with_limit = [k for k, w in enumerate(walks) if w.limit is not None]
+    for batch in _batches([walkers[k] for k in with_limit], numerics):
+        members = [with_limit[m] for m in batch]
         batch_walkers = [walkers[k] for k in members]
         limits = [walks[k].limit for k in members]
         new_fields = _fields_at_limits(batch_walkers, numerics, limits, advance)
