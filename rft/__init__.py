@@ -1,4 +1,6 @@
-"""Resistive force theory: force laws, bodies and the balance of forces. Gaits are in `geomech`."""
+"""Resistive force theory: force laws, bodies and the balance of forces.
+
+Gaits are in `geomech`."""
 
 import importlib
 import pkgutil
@@ -23,16 +25,20 @@ if TYPE_CHECKING:
     from rft.motion.stepping import TimeSteps, time_steps
     from rft.motion.work import Work, work_done
 
-SOLVER = 13  # version of the numbers, raised with every change of one; results of other versions are not resumed
+# Version of the numbers, raised with every change of one; results of other versions are
+# not resumed.
+SOLVER = 13
 _NAMES = {
     "rft.balance.velocity": "Solution body_velocity",
     "rft.bodies": "Backbone Body Chain ConstantCurvature Serpenoid",
-    "rft.effects": "BodyInertia DepthProfile DisturbedGround EndCaps GrainInertia SkinFriction Slope TowedSled Transient",
+    "rft.effects": "BodyInertia DepthProfile DisturbedGround EndCaps GrainInertia "
+    "SkinFriction Slope TowedSled Transient",
     "rft.laws": "CATALOGUE Coulomb Granular Medium Surface Table Viscous",
     "rft.core.refusal": "Refusal",
     "rft.motion.stepping": "TimeSteps time_steps",
     "rft.motion.work": "Work work_done",
 }
+# Modules by the names that they define.
 _MODULES = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 
@@ -40,16 +46,15 @@ def __getattr__(name: str) -> Any:
     """Import a name at its first use: a command that refuses needs no mechanics."""
     if name in _MODULES:
         return getattr(importlib.import_module(_MODULES[name]), name)
-    if name in {module.name for module in pkgutil.iter_modules(__path__)}:
+    packages = {module.name for module in pkgutil.iter_modules(__path__)}
+    if name in packages:
         return importlib.import_module(f"rft.{name}")
     raise AttributeError(f"module 'rft' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return [
-        *__all__,
-        *(module.name for module in pkgutil.iter_modules(__path__) if module.ispkg),
-    ]
+    modules = pkgutil.iter_modules(__path__)
+    return [*__all__, *(module.name for module in modules if module.ispkg)]
 
 
 __all__ = [

@@ -1,5 +1,7 @@
-"""`python -m rft` compiles the solver, the contact with the ground, the steps of robots and, where MuJoCo is installed, the
-forces of grains in it, so that no later run has to."""
+"""`python -m rft` compiles code, so that no later run has to.
+
+It compiles the solver, the contact with the ground, the steps of robots and, where
+MuJoCo is installed, the forces of grains in it."""
 
 import importlib.util
 import sys
@@ -18,53 +20,75 @@ from rft.terradynamics.meshes.extruded import Extruded
 from rft.terradynamics.plates import VERTICAL, CLeg, loads
 from rft.terradynamics.walking import Fineness, Rhex, Tripod, Walker, engine
 
+LAW = CATALOGUE["glass-0.3mm-loose"].medium
+STRESS = VERTICAL["generic"].stress
+LEG = CLeg(0.02, 0.01)
+# The solutions of this law fold at this shape, so they are followed along their curve.
+FOLDING_LAW = Granular(8.0, radians(35.0))
+FOLDING_SHAPE = (-1.47053323, -1.9356507)
+FOLDING_RATE = (-0.99735926, -0.07262584)
+
+
+def compile_balances() -> None:
+    """Compile the balance of forces in the horizontal plane."""
+    body_velocity(LAW, Chain(), (1.0, 1.0), (1.0, 1.0))
+    body_velocity(FOLDING_LAW, Chain(), FOLDING_SHAPE, FOLDING_RATE)
+
+
+def compile_plates() -> None:
+    """Compile the contact of plates with the ground, and the steps of robots."""
+    loads(STRESS, LEG.outline(8), (0.0, -0.1, 0.0), (1.0, 0.0, 0.0))
+    robot = Rhex(0.1, 0.1, 0.02, 0.05, LEG, (0.0,))
+    walker = Walker(robot, Tripod(1.0), STRESS)
+    engine("planar").step_cost([walker], Fineness(), seconds=0.0)
+
+
+def compile_faces() -> None:
+    """Compile the contact of meshes with the ground, by themselves and in MuJoCo."""
+    box = shapes.box((1.0, 1.0, 1.0))
+    zeros = np.zeros((1, 1, 3))
+    zero = zeros[..., 0]
+    at_rest = faces.Motion(zeros, zeros, zero, zeros, zeros, zero)
+    for law in (Extruded(STRESS), Spatial(1e5)):
+        blocks = Blocks([faces.faces(box.vertices[box.faces], box.normals)])
+        blocks.loads(law, Ground(), at_rest)
+        if importlib.util.find_spec("mujoco"):
+            compile_mujoco(law)
+
+
+def compile_mujoco(law: Extruded | Spatial) -> None:
+    """Compile the forces of grains in MuJoCo."""
+    from rft.mujoco.compiled import kernel, recorder
+    from rft.mujoco.compiled_parts import element_code
+    from rft.mujoco.compiled_solver import solver_code
+
+    solver_code()
+    kernel()
+    recorder()
+    element_code(type(faces.record(law)))
+
+
+def report_cache() -> None:
+    """Print where the compiled code is stored."""
+    # Only after the check: the import loads numba.
+    from rft.balance.compiled import kernel
+
+    path = kernel(type(record(LAW)))._cache.path
+    if path.exists():
+        print(f"compiled code is kept in {path.parent}")
+    else:
+        print(
+            "compiled code is not kept: set NUMBA_CACHE_DIR to a folder that has room "
+            "for it"
+        )
+
+
 try:
     check("numba")
 except ValueError as error:
     sys.exit(str(error))
-FOLDED = Granular(
-    8.0, radians(35.0)
-)  # whose solutions fold at the shape below, so that a walk is taken along them
-law, stress, leg = (
-    CATALOGUE["glass-0.3mm-loose"].medium,
-    VERTICAL["generic"].stress,
-    CLeg(0.02, 0.01),
-)
 with preferring("numba"):
-    body_velocity(law, Chain(), (1.0, 1.0), (1.0, 1.0))
-    body_velocity(
-        FOLDED, Chain(), (-1.47053323, -1.9356507), (-0.99735926, -0.07262584)
-    )
-    loads(stress, leg.outline(8), (0.0, -0.1, 0.0), (1.0, 0.0, 0.0))
-    engine("planar").step_cost(
-        [Walker(Rhex(0.1, 0.1, 0.02, 0.05, leg, (0.0,)), Tripod(1.0), stress)],
-        Fineness(),
-        0.0,
-    )
-
-    box, still = shapes.box((1.0, 1.0, 1.0)), np.zeros((1, 1, 3))
-    for form in (Extruded(stress), Spatial(1e5)):
-        blocks = Blocks([faces.faces(box.vertices[box.faces], box.normals)])
-        blocks.loads(
-            form,
-            Ground(),
-            faces.Motion(still, still, still[..., 0], still, still, still[..., 0]),
-        )
-        if importlib.util.find_spec("mujoco"):
-            from rft.mujoco.compiled import kernel as kernel_of_mujoco
-            from rft.mujoco.compiled import recorder
-            from rft.mujoco.compiled_parts import element_code
-            from rft.mujoco.compiled_solver import solver_code
-
-            solver_code()
-            kernel_of_mujoco()
-            recorder()
-            element_code(type(faces.record(form)))
-
-from rft.balance.compiled import kernel  # noqa: E402  # after the check, for the import loads numba
-
-path = kernel(type(record(law)))._cache.path
-not_stored = (
-    "compiled code is not kept: set NUMBA_CACHE_DIR to a folder that has room for it"
-)
-print(f"compiled code is kept in {path.parent}" if path.exists() else not_stored)
+    compile_balances()
+    compile_plates()
+    compile_faces()
+report_cache()

@@ -17,7 +17,7 @@ FACTS = {"lammps": 20250722, "grains": 16225}
 def obey(patch):
     """Let experiments return runs by the law. patch: a MonkeyPatch."""
     for module in (grains, grain_swim):
-        patch.setattr(module, "lammps", lambda: None)
+        patch.setattr(module, "load_lammps", lambda: None)
     settled = types.SimpleNamespace(facts={"packing": 0.6, "surface": 0.05})
     patch.setattr(grains, "settle", lambda *_: settled)
     patch.setattr(Experiment, "run", run)
@@ -39,7 +39,7 @@ def towed(experiment):
         strength *= 1.05
     caps = EndCaps(body.half_width / body.size, head=1.7, tail=0.0)
     traction = np.array(LAW.traction(*v))
-    spacing = np.diff(body.along[1:-1]).mean()
+    spacing = np.diff(body.arc_length[1:-1]).mean()
     profile = np.zeros((200, n, 3))
     profile[..., :2] = -strength * spacing * traction
     rest = strength * (body.size - n * spacing) * traction
@@ -51,7 +51,7 @@ def towed(experiment):
     overlaps = np.full((2, 2), 0.04)
     facts = dict(FACTS)
     return Run(
-        t, nothing, nothing, profile, body.along, *[nothing] * 6, overlaps, facts
+        t, nothing, nothing, profile, body.arc_length, *[nothing] * 6, overlaps, facts
     )
 
 

@@ -99,7 +99,7 @@ def test_the_error_of_caps_is_their_scatter_over_many_fits():
 @pytest.fixture
 def towed(monkeypatch):
     """Runs of rods that obey the law, with 5 % more drag in the second bed, in place of those of LAMMPS."""
-    monkeypatch.setattr(grains, "lammps", lambda: None)
+    monkeypatch.setattr(grains, "load_lammps", lambda: None)
     monkeypatch.setattr(
         grains,
         "settle",
@@ -112,7 +112,7 @@ def towed(monkeypatch):
         strength = 2.0 * (1.05 if experiment.bed.seed == 5 else 1.0)  # N/m
         caps = EndCaps(body.half_width / body.size, head=1.7, tail=0.0)
         profile = np.zeros((200, n, 3))
-        spacing = np.diff(body.along[1:-1]).mean()
+        spacing = np.diff(body.arc_length[1:-1]).mean()
         profile[..., :2] = -strength * spacing * np.array(LAW.traction(*v))
         rest = strength * (body.size - n * spacing) * np.array(LAW.traction(*v))
         profile[:, -1, :2] -= (
@@ -127,7 +127,7 @@ def towed(monkeypatch):
             nothing,
             nothing,
             profile,
-            body.along,
+            body.arc_length,
             *[nothing] * 6,
             overlaps,
             {"lammps": 20250722, "grains": 16225},
@@ -253,7 +253,7 @@ def test_a_swim_stands_beside_the_tiers(monkeypatch, tmp_path):
         'kind = "circle"\namplitude = 0.9\nfrequency = 2.0\nreverse = true\n[[effects]]\nkind = "end-caps"\nradius_m = 0.009\n'
         "[numerics]\nphases = 32\ngrid = 7\n"
     )
-    monkeypatch.setattr(grain_swim, "lammps", lambda: None)
+    monkeypatch.setattr(grain_swim, "load_lammps", lambda: None)
     asked = []
 
     def run(experiment, folder, progress=None):

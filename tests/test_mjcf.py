@@ -26,7 +26,7 @@ mujoco = pytest.importorskip(
 )
 pytestmark = pytest.mark.usefixtures("fastest")
 from rft.terradynamics.walking import geoms  # noqa: E402
-from rft.terradynamics.walking.machine import Clock, machine  # noqa: E402
+from rft.terradynamics.walking.machine import Clock, build_machine  # noqa: E402
 from rft.terradynamics.walking.mujoco_walk import Simulation  # noqa: E402
 
 ACTUATOR = '<position name="{0}" joint="{0}" kp="40" kv="0.4"/>'
@@ -419,7 +419,7 @@ def test_a_sweep_of_robots_that_walk_alone_tells_how_far_it_is(tmp_path, monkeyp
 def test_pictures_are_those_of_a_gl_or_none(cart):
     scene = scenes.load(cart / "cart.toml")
     view = walking.view(scene)
-    states = np.tile(machine(scene.robot, 10).model.qpos0, (2, 1))
+    states = np.tile(build_machine(scene.robot, 10).model.qpos0, (2, 1))
     states[:, 2] = 0.03
     assert view.triangles(states[0])[..., 2].min() == pytest.approx(0.0, abs=0.002)
     pictures = view.pictures(states, 160, 120)
@@ -450,7 +450,7 @@ def test_without_the_extra_there_is_one_line_with_the_cure(cart, geomech, monkey
 
 def test_the_clock_of_a_robot_of_the_plane_is_that_of_its_tripods():
     robot = scenes.load("xplorer").robot
-    made = machine(robot, 6)
+    made = build_machine(robot, 6)
     clock = Clock(made, Tripod(2.0, 0.3, 1.0))
     assert [made.model.actuator(k).name for k in made.driven] == [
         f"leg{k}" for k in range(6)

@@ -36,8 +36,8 @@ from rft.terradynamics.walking.mujoco_walk import (  # noqa: E402
     Simulation,
     Start,
     _goes_straight,
-    _moved,
-    _until,
+    _move,
+    _rows_until,
     rerun,
     walk,
 )
@@ -342,7 +342,7 @@ def test_legs_alternate_as_in_the_plane():
     legs = dict(
         zip(
             map(tuple, np.sign(hexapod.hips(robot)).astype(int).tolist()),
-            hexapod.phases(robot),
+            hexapod.leg_phases(robot),
         )
     )
     assert {k for k, phase in legs.items() if phase} == {
@@ -514,7 +514,7 @@ def test_strides_are_repeated_until_the_walk_is_over():
         (0.7, 4, known[:6]),
         (3.0, 0, known),
     ):
-        rows, states = _until(duration, course(known), positions(known), steps)
+        rows, states = _rows_until(duration, course(known), positions(known), steps)
         np.testing.assert_allclose(rows, course(t), atol=1e-12)
         np.testing.assert_allclose(states, positions(t), atol=1e-12)
 
@@ -528,7 +528,7 @@ def test_a_way_is_along_and_to_the_left_of_the_first_heading():
     )
     way = complex(-3.0, 0.5) * np.exp(-3.0j)
     np.testing.assert_allclose(
-        _moved(before, after), [way.real, way.imag, 2 * np.pi - 6.0], rtol=1e-12
+        _move(before, after), [way.real, way.imag, 2 * np.pi - 6.0], rtol=1e-12
     )
 
 
@@ -648,7 +648,7 @@ def test_a_hull_pitches_as_its_robot_is_told_and_rolls_and_yaws_as_a_box_would()
     )
     wheel = Roller(2.0, RoundRod(0.1, 0.1))
     assert hexapod.inertia(wheel, 0.1).tolist() == pytest.approx([0.02] * 3)
-    assert (hexapod.hips(wheel), hexapod.phases(wheel).tolist()) == (
+    assert (hexapod.hips(wheel), hexapod.leg_phases(wheel).tolist()) == (
         [(0.0, 0.0, 0.0)],
         [0.0],
     )

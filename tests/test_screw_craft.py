@@ -99,7 +99,7 @@ def test_a_craft_walks_as_a_command(geomech, tmp_path, monkeypatch):
     from rft.terradynamics.walking import mujoco_walk
 
     monkeypatch.setattr(mujoco_walk, "MOST_STRIDES", 1)
-    monkeypatch.setattr(mujoco_walk, "FEW_STRIDES", 1)
+    monkeypatch.setattr(mujoco_walk, "STRIDES_NEAR_LIMIT", 1)
     (tmp_path / "small.toml").write_text(SMALL)
     (tmp_path / "out").mkdir()
     code, out, err = geomech(

@@ -10,7 +10,7 @@ from rft.terradynamics.meshes import Screw, Spatial, wrench
 from rft.terradynamics.walking.craft import Screws
 from rft.terradynamics.walking.screws import (
     _solve,
-    _Steady,
+    _SteadyCraft,
     cruise,
     free_turning,
     turning,
@@ -350,7 +350,9 @@ def test_craft_of_other_sizes_and_gravity_go_alike():
 def test_a_craft_of_no_weight_floats_on_its_screws():
     assert (
         1.9
-        < _Steady(SAND, dataclasses.replace(CRAFT, mass=1e-3), 1.0, **COARSE).floating()
+        < _SteadyCraft(
+            SAND, dataclasses.replace(CRAFT, mass=1e-3), 1.0, **COARSE
+        ).floating_height()
         < 2.0
     )  # radii
 

@@ -43,13 +43,13 @@ from rft.terradynamics.walking.limit import (
     _with_means,
     limit_cycles,
     predicted_progress,
-    solve,
+    solve_regular,
 )
 from rft.terradynamics.walking.march import march, step
 from rft.terradynamics.walking.planar import State
 from rft.terradynamics.walking.planar_walk import (
     _limit_fields,
-    _rows,
+    _rows_until,
     _strides,
     rerun,
     walk,
@@ -67,9 +67,9 @@ from rft.terradynamics.walking.sdirk import (
 from rft.terradynamics.walking.stride import (
     Walk,
     cycles_to_settle,
-    from_rest,
     map_period,
     remaining_change,
+    walk_from_rest,
 )
 
 pytestmark = pytest.mark.usefixtures("fastest")
@@ -317,12 +317,12 @@ def test_what_a_limit_tells_is_of_a_stride_and_a_walk_of_a_second():
         (6, [False, True]),
         (7, [True, True]),
     ):
-        search.computed[:], search.last[:] = (
+        search.computed[:], search.last_size[:] = (
             computed,
             np.inf,
         )  # a slope serves three strides of its map
         search._step(both, search.start.copy(), residual / 10, np.zeros(2))
-        assert search.unknown.tolist() == unknown
+        assert search.needs_slopes.tolist() == unknown
     one = np.ones(1)
     for progress, status in ((4.0e-4, "stuck"), (4.2e-4, "walking")):
         found = LimitCycles(
@@ -370,7 +370,7 @@ def test_the_limit_cycle_is_that_of_many_strides():
     and the first and the last get there by themselves."""
     walkers = [xplorer(c, f) for c, f in ((0.3, 3.0), (-0.6, 3.25), (1.0, 4.0))]
     strides, every = _strides(walkers, Fineness(steps=12, elements=6)), np.arange(3)
-    state, _, _, _, period = from_rest(strides, 3 / strides.frequency)
+    state, _, _, _, period = walk_from_rest(strides, 3 / strides.frequency)
     assert period.tolist() == [1, 1, 2]
     found = limit_cycles(strides, [Limit(state.take([k]), period[k]) for k in every])
     assert (
@@ -389,7 +389,10 @@ def test_the_limit_cycle_is_that_of_many_strides():
     )
     last = strides.run(strides.run(first, 0, every)[1].take(-1), 0, every)[1].take(-1)
     assert (
-        np.abs(strides.scaled(last, every) - strides.scaled(first, every)).max() < 2e-3
+        np.abs(
+            strides.scaled_state(last, every) - strides.scaled_state(first, every)
+        ).max()
+        < 2e-3
     )
     np.testing.assert_allclose(
         last.pose[:, 0] - first.pose[:, 0], 2 * found.progress, rtol=5e-3
@@ -586,7 +589,7 @@ def test_slow_robots_walk_as_their_clock_says():
     assert all(w.periodic and w.unsolved == 0 for w in found)
     np.testing.assert_allclose(ways[:2], ways[2], rtol=0.01)
     assert 0.1 < ways[2] < 2 * np.pi * 0.041
-    rest = from_rest(
+    rest = walk_from_rest(
         _strides([xplorer(1.0, 0.02)], Fineness(steps=16, elements=6)),
         np.array([1000.0]),
     )
@@ -741,7 +744,7 @@ def test_an_estimate_that_is_small_by_chance_is_not_taken(monkeypatch):
         rerun=lambda w, numerics, *rest, **more: [
             types.SimpleNamespace(**means(other(numerics)))
         ],
-        refined=planar_walk.refined,
+        variations=planar_walk.variations,
     )
     monkeypatch.setattr(walking, "engine", lambda name: how)
     numerics = dataclasses.replace(XPLORER.numerics, steps=32, elements=12)
@@ -1140,7 +1143,7 @@ def test_compiled_steps_are_those_by_numpy(tension, effort, monkeypatch):
             strides.rate_phases,
         )
         ends, found = (
-            (strides.top, strides.out_of_reach * [1.0, 1.0, 0.1][: len(walkers)]),
+            (strides.top, strides.airborne_height * [1.0, 1.0, 0.1][: len(walkers)]),
             {},
         )
         for backend in ("numpy", "numba"):
@@ -1148,7 +1151,9 @@ def test_compiled_steps_are_those_by_numpy(tension, effort, monkeypatch):
                 found[backend] = march(*at, ends)
         (slow, tries), (fast, others) = found.values()
         np.testing.assert_array_equal(tries, others)
-        np.testing.assert_allclose(fast.packed(), slow.packed(), rtol=1e-7, atol=1e-9)
+        np.testing.assert_allclose(
+            fast.to_array(), slow.to_array(), rtol=1e-7, atol=1e-9
+        )
         unsolved.append(slow.unsolved[-1].sum())
         stopped.append((slow.pose[-1] == slow.pose[-2]).all(-1).tolist())
     assert any(unsolved) == (effort is not EFFORT) and stopped == [
@@ -1247,7 +1252,7 @@ def test_slopes_at_a_limit_foretell_the_strides_on_the_way_to_it(period):
     """Each map of so many strides takes the distance on, and adds what the gains make of it to the progress of each."""
     slopes, gains = np.array([[0.6, -0.3], [0.2, 0.5]]), np.array([0.03, -0.07])
     fake = types.SimpleNamespace(
-        cycle=2, scaled=lambda state, index: np.array([[state], [2.0 * state]])
+        cycle=2, scaled_state=lambda state, index: np.array([[state], [2.0 * state]])
     )
     found = predicted_progress(fake, Limit(0.1, period, slopes, gains), 0.6, 0, 0.02)
     distance = [
@@ -1275,7 +1280,7 @@ def test_strides_that_repeat_themselves_go_on_until_the_walk_is_over():
         (2, 0.6, 0.5),
         (0, 2.3, 1.0),
     ):
-        found = _rows([rows(t) for t in times], cycle, duration)
+        found = _rows_until([rows(t) for t in times], cycle, duration)
         np.testing.assert_allclose(
             found, rows(np.arange(0, last + 1e-9, 0.125)), atol=1e-12
         )
@@ -1325,7 +1330,9 @@ def test_a_step_of_newtons_method_goes_to_the_zero_of_a_line_but_not_too_far():
     step, solved, failed = newton_step(
         last, tuple(residual), slopes, power, k, reach, 1e-6, EFFORT
     )
-    assert not solved.any() and not failed.any() and step.tries.tolist() == [1.0] * 3
+    assert (
+        not solved.any() and not failed.any() and step.evaluations.tolist() == [1.0] * 3
+    )
     far = (
         0.5 * reach / k / 9.3
     )  # a half of its reach in the step's time, over the fastest rate
@@ -1360,7 +1367,9 @@ def test_a_step_of_newtons_method_goes_to_the_zero_of_a_line_but_not_too_far():
         (1.0, 13.0, True),
     ):
         late = last._replace(
-            share=np.full(3, share), tries=np.full(3, tries), residual=np.full(3, 1e-9)
+            share=np.full(3, share),
+            evaluations=np.full(3, tries),
+            residual=np.full(3, 1e-9),
         )
         assert (
             newton_step(late, tuple(residual), slopes, power, k, reach, 1e-6, EFFORT)[
@@ -1373,7 +1382,9 @@ def test_a_step_of_newtons_method_goes_to_the_zero_of_a_line_but_not_too_far():
 def test_a_part_of_a_step_adds_what_its_stages_did():
     """Powers by the weights of its stages, and the residuals of those that were not solved; else all stays."""
     first = tuple(np.full(4, x) for x in (3.0, 2.0)), np.array([1e-9, 1e-9, 5e-3, 1e-9])
-    stage = types.SimpleNamespace(base=(1.0, 2.0, 3.0), first=(*first[0], first[1]))
+    stage = types.SimpleNamespace(
+        base=(1.0, 2.0, 3.0), first_result=(*first[0], first[1])
+    )
     best, power = (0.1, 0.2, 0.3), (np.full(4, 10.0), np.full(4, 20.0))
     newton = types.SimpleNamespace(
         best=best, power=power, residual=np.array([1e-8, 2e-3, 1e-3, 2e-3])
@@ -1459,15 +1470,15 @@ def test_a_robot_comes_to_an_end_above_its_reach_below_its_top_and_on_its_back()
         0.4 / speed,
         0.5 * strides.reach / speed,
     ]
-    np.testing.assert_allclose(strides.scaled(state, np.arange(2)), scaled)
-    moved = strides.with_scaled(state, 2 * np.array(scaled), np.arange(2))
+    np.testing.assert_allclose(strides.scaled_state(state, np.arange(2)), scaled)
+    moved = strides.with_scaled_state(state, 2 * np.array(scaled), np.arange(2))
     np.testing.assert_allclose(
         [*moved.pose[1], *moved.twist[1]], [9.0, 0.2, 0.4, 0.6, 0.8, 1.0]
     )
     roller = _strides(
         [Walker(Roller(1.0, RoundRod(0.05, 0.02)), Tripod(1.0, 0.3), SAND)], QUICK
     )
-    assert roller.scaled(state.take([0]), one)[:, 0] == pytest.approx(
+    assert roller.scaled_state(state.take([0]), one)[:, 0] == pytest.approx(
         np.array([0.1, 0.3 / (2 * np.pi), 0.4 / (2 * np.pi)]) / 0.05
     )
     kinks = roller.phases[np.flatnonzero(np.diff(roller.rate_phases) != 0) + 1]
@@ -1486,9 +1497,11 @@ def test_equations_without_a_solution_are_answered_by_nothing():
     )
     right = np.array([[3.0, 4.0], [1.0, 1.0], [5.0, 6.0]])
     np.testing.assert_allclose(
-        solve(slopes, right), [[1.0, 1.0], [0.0, 0.0], [6.0, 5.0]]
+        solve_regular(slopes, right), [[1.0, 1.0], [0.0, 0.0], [6.0, 5.0]]
     )
-    np.testing.assert_allclose(solve(slopes[::2], right[::2]), [[1.0, 1.0], [6.0, 5.0]])
+    np.testing.assert_allclose(
+        solve_regular(slopes[::2], right[::2]), [[1.0, 1.0], [6.0, 5.0]]
+    )
 
 
 def test_the_rounding_of_slow_legs_is_a_twentieth_of_the_speed_of_their_ends():

@@ -28,7 +28,7 @@ from geomech.io.files import write_text
 from geomech.scenes import load
 from geomech.studies.grain_swim import RAMP, GrainSwim, cycle_poses
 from rft.grains import Bed, Experiment, Run, Spheres, Stroke, Tow, plate, rod
-from rft.grains.drag import Steady, steady
+from rft.grains.drag import SteadyForce, steady_force
 from rft.grains.reversal import drags
 
 FOLDER = Path(__file__).parent
@@ -213,14 +213,14 @@ def plates(store: Path) -> Rows:
         )
         sin, cos = math.sin(math.radians(beta)), math.cos(math.radians(beta))
         back, up = np.array([-sin, cos]), np.array([cos, sin])
-        middle = np.abs(body.at[:, 1:] @ up) < height / 2 - EDGE
+        middle = np.abs(body.offsets[:, 1:] @ up) < height / 2 - EDGE
         front = np.arange(len(middle)) < len(middle) // 2
         patch = GRAIN * (height - 2 * GRAIN) / round(height / GRAIN)  # m^2 of a sphere
         parts = [(m, m.sum() * patch) for m in (middle & front, middle & ~front)]
         parts.append((middle | True, TROUGH.length * height))
         for seed in BEDS:
             force = steady_towed(body, seed, store).profile[:, 1:]
-            over_depth = 1e-6 * force / (BAR_DEPTH - body.at[:, 2:])
+            over_depth = 1e-6 * force / (BAR_DEPTH - body.offsets[:, 2:])
             stress = [
                 over_depth[mine].sum(0) @ way / area
                 for mine, area in parts
@@ -237,28 +237,28 @@ def faces(store: Path) -> Rows:
         for shape in BARS
     }
     for shape, bar in {**bars, SHELL: rear_half(bars["round"])}.items():
-        rows = np.unique(bar.at[:, 1:], axis=0)
+        rows = np.unique(bar.offsets[:, 1:], axis=0)
         for seed in BEDS[:2] if shape == SHELL else BEDS:
             force = steady_towed(bar, seed, store).profile[:, 1:]
             for row in rows:
-                on_row = force[(bar.at[:, 1:] == row).all(1)].sum(0)
+                on_row = force[(bar.offsets[:, 1:] == row).all(1)].sum(0)
                 yield f'"{shape}"', seed, *map(float, (*row, -on_row[0], on_row[1]))
 
 
 def rear_half(bar: Spheres) -> Spheres:
     """Return the rear half of a round bar: a thin sheet whose hollow leads."""
-    at = bar.at[bar.at[:, 1] < 1e-9] + [0.0, (BAR - GRAIN) / 2, 0.0]
+    at = bar.offsets[bar.offsets[:, 1] < 1e-9] + [0.0, (BAR - GRAIN) / 2, 0.0]
     at = at[np.lexsort((at[:, 2], at[:, 0]))]
     return replace(bar, at=at, link=bar.link[: len(at)], radius=bar.radius[: len(at)])
 
 
-def steady_towed(body: Spheres, seed: int, store: Path) -> Steady:
+def steady_towed(body: Spheres, seed: int, store: Path) -> SteadyForce:
     """Return the steady force on a body that is towed across the trough."""
     tow = Tow(SPEED, math.pi / 2)
     run = Experiment(replace(TROUGH, seed=seed), body, tow, 0.6, depth=BAR_DEPTH).run(
         store
     )
-    return steady(run, body.half_width, tow.angle, SPEED)
+    return steady_force(run, body.half_width, tow.angle, SPEED)
 
 
 def convergence(store: Path) -> Rows:
@@ -285,7 +285,7 @@ def convergence(store: Path) -> Rows:
     )
     for name, bed in changes.items():
         run = Experiment(bed, bar, tow, 0.6, depth=BAR_DEPTH).run(store)
-        found = steady(run, BAR, tow.angle, SPEED)
+        found = steady_force(run, BAR, tow.angle, SPEED)
         force, error = found.force, found.error
         overlap = float(run.overlaps[:, 0].max())
         yield f'"{name}"', -force[1], error[1], force[2], error[2], found.lift, overlap

@@ -84,16 +84,18 @@ def points(question: GrainSwim, phases: int = PHASES) -> Points:
     heading, rates, centres, velocities = (np.array(x) for x in zip(*links))
     link, at = (
         np.r_[0, body.link, body.n_links - 1],
-        np.r_[-half[0], body.at[:, 0], half[-1]],
+        np.r_[-half[0], body.offsets[:, 0], half[-1]],
     )
     lever = heading[:, link] * at
-    edges = np.r_[-body.size / 2, (body.along[1:] + body.along[:-1]) / 2, body.size / 2]
+    edges = np.r_[
+        -body.size / 2, (body.arc_length[1:] + body.arc_length[:-1]) / 2, body.size / 2
+    ]
     return Points(
         heading[:, link],
         centres[:, link] + lever,
         velocities[:, link] + 1j * rates[:, link] * lever,
         np.r_[0.0, np.diff(edges), 0.0],
-        np.abs(np.r_[-body.size / 2, body.along, body.size / 2])
+        np.abs(np.r_[-body.size / 2, body.arc_length, body.size / 2])
         > body.size / 2 - END * body.half_width,
     )
 

@@ -23,7 +23,7 @@ from rft.bodies.links import Links
 from rft.core.refusal import Refusal, located, require
 from rft.effects import EndCaps
 from rft.grains.bed import Bed
-from rft.grains.engine import lammps
+from rft.grains.engine import load_lammps
 from rft.grains.experiment import Experiment, Run
 from rft.grains.motions import Swim
 from rft.grains.spheres import chain
@@ -139,7 +139,7 @@ class GrainSwim:
         require(1 <= self.cycles <= 1000, "cycles must be 1 to 1000", value=self.cycles)
         with located(self.scene.name):
             self.experiment.check()
-        lammps()
+        load_lammps()
         store_folder(self.store)
 
     def cost(self) -> GrainSteps:

@@ -18,9 +18,9 @@ from geomech.studies.calibration import fit_variables
 from rft.core.refusal import Refusal, require
 from rft.fits.rods import Fit, fit
 from rft.grains.bed import Bed
-from rft.grains.drag import SETTLED, Drag, flank_and_ends
-from rft.grains.engine import lammps
-from rft.grains.experiment import SETTLING, Experiment, Run, settle
+from rft.grains.drag import UNSTEADY_TRAVEL, Drag, flank_and_ends
+from rft.grains.engine import load_lammps
+from rft.grains.experiment import SETTLING_TIMES, Experiment, Run, settle
 from rft.grains.motions import Tow
 from rft.grains.spheres import Spheres, rod
 from rft.laws.drag import Rod, rod_drag
@@ -29,7 +29,8 @@ from rft.laws.drag import Rod, rod_drag
 # written on.
 RATE = 1.8e6
 LONGEST = 600.0  # s of computing that a command begins without consent
-TRAVEL = 7.5  # half widths that a rod is dragged, the first `SETTLED` not counted
+# Half widths that a rod is dragged, without the first `UNSTEADY_TRAVEL`.
+TRAVEL = 7.5
 Progress = Callable[[float], None]
 
 
@@ -65,7 +66,7 @@ def price(experiments: Sequence[Experiment], store: Path) -> GrainSteps:
         if not experiment.is_settled(store):
             unsettled[experiment.bed] = experiment
     for experiment in unsettled.values():
-        settling = sum(SETTLING) / experiment.bed.step
+        settling = sum(SETTLING_TIMES) / experiment.bed.step
         steps += experiment.grain_steps * settling / experiment.n_steps
     return GrainSteps(round(steps), steps / RATE, BASE, steps / RATE)
 
@@ -135,7 +136,7 @@ class DraggedRod:
         )
         for experiment in self.experiments()[: len(angles)]:
             experiment.check()
-        lammps()
+        load_lammps()
 
     def cost(self, store: Path) -> GrainSteps:
         return price(self.experiments(), store)
@@ -244,7 +245,7 @@ class DraggedRod:
         lines = [
             "Drag on the flank of a rod, and on both its ends together beyond that, in "
             f"beds of grains (LAMMPS {int(rows[0, 0, 11])}, Hertz-Mindlin); mean after "
-            f"{mm * SETTLED * self.radius:g} mm of travel",
+            f"{mm * UNSTEADY_TRAVEL * self.radius:g} mm of travel",
             f"grains {mm * bed.diameter:g} mm +-{100 * bed.spread:g} %, density "
             f"{bed.density:g} kg/m^3, packing {packing:.4f}; rod "
             f"{2 * mm * self.radius:g} mm diameter x {mm * self.length:g} mm, axis "

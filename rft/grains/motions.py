@@ -1,7 +1,9 @@
-"""Motions of a body in a bed: towed, to and fro, and free in the plane with prescribed joints.
+"""Motions of a body in a bed: towed, back and forth, and free in the plane with
+prescribed joints.
 
-A motion is a state, numbers that a stopped run keeps, and two functions of it: the next state under the force of the
-grains, and the placement of the body."""
+A motion has a state, numbers from which an interrupted run is resumed, and two
+functions of it: the next state under the force of the grains, and the placement of the
+body."""
 
 from __future__ import annotations
 
@@ -15,12 +17,16 @@ from rft.core.checks import Number, check_numbers
 from rft.core.refusal import require
 from rft.grains.spheres import Placement, Spheres
 
-SAMPLES = 256  # shapes of a cycle that name a swim and are looked through for links that touch
+# Shapes of a cycle, which identify a swim; one of four is checked for links that touch.
+SAMPLES = 256
 
 
-class Moved(NamedTuple):
-    """A body at a time. placement: of its spheres. pose: (3,), x and y of its frame, m, and heading, rad. centre: of mass,
-    m, x + i y, about which moments are taken. alpha: joint angles, rad. kinetic: energy of the body, J."""
+class BodyState(NamedTuple):
+    """A body at a time.
+
+    placement: of its spheres. pose: (3,), x and y of its frame, m, and heading, rad.
+    centre: of mass, m, x + i y, about which moments are taken. alpha: joint angles,
+    rad. kinetic: energy of the body, J."""
 
     placement: Placement
     pose: np.ndarray
@@ -30,11 +36,13 @@ class Moved(NamedTuple):
 
 
 class Motion(Protocol):
-    """A motion of a body. `named` returns all data that it consists of, `check` refuses what it cannot do."""
+    """A motion of a body."""
 
-    def named(self) -> tuple: ...
+    def identity(self) -> tuple:
+        """Return all numbers and names that the motion consists of."""
 
-    def check(self, body: Spheres) -> None: ...
+    def check(self, body: Spheres) -> None:
+        """Raise ValueError for a motion that the body cannot do."""
 
     def start(self) -> np.ndarray:
         """Return the state at rest."""
@@ -42,7 +50,8 @@ class Motion(Protocol):
     def push(
         self, state: np.ndarray, force: np.ndarray, moment: float, dt: float
     ) -> np.ndarray:
-        """Return the state with the momentum that a force (3,), N, and a moment about z, N m, add in dt (s)."""
+        """Return the state with the momentum that a force (3,), N, and a moment about
+        z, N m, add in dt (s)."""
 
     def move(
         self,
@@ -52,14 +61,16 @@ class Motion(Protocol):
         body: Spheres,
         mass: float,
         height: float,
-    ) -> tuple[np.ndarray, Moved]:
-        """Return the state at t (s), which is dt later, and the body there. mass: kg. height: of the axis, m."""
+    ) -> tuple[np.ndarray, BodyState]:
+        """Return the state at t (s), which is dt later, and the body there. mass: kg.
+        height: of the axis, m."""
 
 
 @dataclass(frozen=True)
 class Tow:
-    """A rigid body, or a straight chain, at constant velocity. speed (m/s). angle (rad): of the velocity from the body's
-    axis, which lies along x.
+    """A rigid body, or a straight chain, at constant velocity.
+
+    speed (m/s). angle (rad): of the velocity from the body's axis, which lies along x.
 
     Examples
     --------
@@ -71,14 +82,14 @@ class Tow:
     speed: Annotated[float, Number(1e-9, 1e3, "m/s", "")]
     angle: Annotated[float, Number(-1e3, 1e3, "rad", "")] = 0.0
 
-    def named(self) -> tuple:
+    def identity(self) -> tuple:
         return type(self).__name__, self.speed, self.angle
 
     def check(self, body: Spheres) -> None:
         check_numbers(self)
 
     def path(self, t: float) -> tuple[float, float]:
-        """Return how far the body is along its line, m, and its speed, m/s."""
+        """Return the distance of the body along its line, m, and its speed, m/s."""
         return self.speed * t, self.speed
 
     def start(self) -> np.ndarray:
@@ -97,24 +108,27 @@ class Tow:
         body: Spheres,
         mass: float,
         height: float,
-    ) -> tuple[np.ndarray, Moved]:
-        zero, direction = np.zeros(body.joints), np.exp(1j * self.angle)
+    ) -> tuple[np.ndarray, BodyState]:
+        zero = np.zeros(body.joints)
+        links = body.links(zero, zero)
+        direction = np.exp(1j * self.angle)
         distance, speed = self.path(t)
-        links, place = body.links(zero, zero), distance * direction
-        origin = place - body.half_lengths @ links.centres / body.half_lengths.sum()
-        placement = body.placed(links, origin, 0.0, speed * direction, 0.0, height)
-        return state, Moved(
-            placement,
-            np.array([origin.real, origin.imag, 0.0]),
-            place,
-            zero,
-            mass * speed**2 / 2,
+        centre = distance * direction
+        origin = centre - body.half_lengths @ links.centres / body.half_lengths.sum()
+        velocity = speed * direction
+        return state, BodyState(
+            placement=body.placement(links, origin, 0.0, velocity, 0.0, height),
+            pose=np.array([origin.real, origin.imag, 0.0]),
+            centre=centre,
+            alpha=zero,
+            kinetic=mass * speed**2 / 2,
         )
 
 
 @dataclass(frozen=True)
 class Stroke(Tow):
-    """A rigid body to and fro at constant speed: from the middle to amplitude (m), then to -amplitude, and so on.
+    """A rigid body back and forth at constant speed: from the middle to amplitude (m),
+    then to -amplitude, and so on.
 
     Examples
     --------
@@ -125,30 +139,37 @@ class Stroke(Tow):
 
     amplitude: Annotated[float, Number(1e-9, 1e3, "m", "")] = 0.02
 
-    def named(self) -> tuple:
-        return (*super().named(), self.amplitude)
+    def identity(self) -> tuple:
+        return (*super().identity(), self.amplitude)
 
     def path(self, t: float) -> tuple[float, float]:
         a = self.amplitude
         q = (self.speed * t + a) % (4 * a)
-        return (q - a, self.speed) if q < 2 * a else (3 * a - q, -self.speed)
+        if q < 2 * a:
+            return q - a, self.speed
+        return 3 * a - q, -self.speed
 
 
 @dataclass(frozen=True, eq=False)
 class Swim:
-    """A body free in the plane with prescribed joint angles; its height is held.
+    """A body free in the plane with prescribed joint angles, at a constant height.
 
-    shape: function of the phase (rad) that returns joint angles (joints,), rad, of period 2 pi. rate: its derivative.
-    frequency (Hz). ramp (s): the shape grows smoothly from the straight body during it. phase (rad): at t = 0.
+    shape: function of the phase (rad) that returns joint angles (joints,), rad, of
+    period 2 pi. rate: its derivative. frequency (Hz). ramp (s): the shape grows
+    smoothly from the straight body during it. phase (rad): at t = 0.
 
-    Momentum and moment of momentum follow from force and moment of the grains by Euler's method, momentum first. The mass
-    of a link is its share of the length.
+    Momentum and moment of momentum follow from force and moment of the grains by
+    Euler's method, momentum first. The mass of a link is its share of the length.
 
     Examples
     --------
     >>> import numpy as np
     >>> from rft.grains import Swim
-    >>> circle = Swim(lambda t: np.array([np.cos(t), np.sin(t)]), lambda t: np.array([-np.sin(t), np.cos(t)]), ramp=0.5)
+    >>> def shape(t):
+    ...     return np.array([np.cos(t), np.sin(t)])
+    >>> def rate(t):
+    ...     return np.array([-np.sin(t), np.cos(t)])
+    >>> circle = Swim(shape, rate, ramp=0.5)
     >>> alpha, alphadot = circle.joint_angles(1.0)  # rad, rad/s
     >>> alpha.round(6), alphadot.round(3)
     (array([ 1., -0.]), array([0.   , 6.283]))
@@ -160,40 +181,44 @@ class Swim:
     ramp: Annotated[float, Number(1e-9, 1e6, "s", "")] = 0.5
     phase: Annotated[float, Number(-1e6, 1e6, "rad", "")] = 0.0
 
-    def named(self) -> tuple:
-        samples = np.array([self.shape(t) for t in self._phases()], float)
+    def identity(self) -> tuple:
         return (
             type(self).__name__,
-            samples.round(12).tolist(),
+            self._shapes().round(12).tolist(),
             self.frequency,
             self.ramp,
             self.phase,
         )
 
-    def _phases(self) -> np.ndarray:
-        return 2 * np.pi * np.arange(SAMPLES) / SAMPLES
+    def _shapes(self) -> np.ndarray:
+        """Return the shapes of a cycle (SAMPLES, joints), rad."""
+        phases = 2 * np.pi * np.arange(SAMPLES) / SAMPLES
+        return np.array([self.shape(phase) for phase in phases], float)
 
     def check(self, body: Spheres) -> None:
         check_numbers(self)
-        shapes = np.array([self.shape(t) for t in self._phases()], float)
+        shapes = self._shapes()
         require(
             shapes.shape[1:] == (body.joints,),
             f"the gait has {shapes.shape[-1]} joint angles, and the body {body.joints}",
         )
-        body.check_apart(shapes[::4])
+        body.require_clearance(shapes[::4])
 
     def joint_angles(self, t: float) -> tuple[np.ndarray, np.ndarray]:
         """Return joint angles, rad, and their rates, rad/s, at t (s)."""
         w = 2 * np.pi * self.frequency
         q = min(t / self.ramp, 1.0)
-        grown, growing = q * q * (3 - 2 * q), 6 * q * (1 - q) / self.ramp
-        alpha, slope = (
-            np.asarray(f(w * t + self.phase), float) for f in (self.shape, self.rate)
-        )
-        return grown * alpha, grown * w * slope + growing * alpha
+        factor = q * q * (3 - 2 * q)
+        factor_rate = 6 * q * (1 - q) / self.ramp
+        phase = w * t + self.phase
+        alpha = np.asarray(self.shape(phase), float)
+        slope = np.asarray(self.rate(phase), float)
+        return factor * alpha, factor * w * slope + factor_rate * alpha
+
+    # The state: x, y of the centre of mass, heading of the frame, momentum x and y,
+    # moment of momentum about the centre.
 
     def start(self) -> np.ndarray:
-        # x, y of the centre of mass, heading of the frame, momentum x and y, moment of momentum about the centre.
         return np.zeros(6)
 
     def push(
@@ -209,30 +234,39 @@ class Swim:
         body: Spheres,
         mass: float,
         height: float,
-    ) -> tuple[np.ndarray, Moved]:
+    ) -> tuple[np.ndarray, BodyState]:
         alpha, alphadot = self.joint_angles(t)
         links = body.links(alpha, alphadot)
         m = mass * body.half_lengths / body.half_lengths.sum()
-        bars = (
-            m * body.half_lengths**2 / 3
-        )  # moments of inertia of thin links about their centres
-        centre, drift = m @ links.centres / mass, m @ links.velocities / mass
-        lever, inner = links.centres - centre, links.velocities - drift
-        inertia = m @ np.abs(lever) ** 2 + bars.sum()
-        spin = m @ (lever.conj() * inner).imag + bars @ links.rates
-        x, y, theta, px, py, L = state
-        v, rate = complex(px, py) / mass, (L - spin) / inertia
-        place, theta = complex(x, y) + dt * v, theta + dt * rate
+        # Moments of inertia of thin links about their centres.
+        link_inertia = m * body.half_lengths**2 / 3
+
+        # In a frame at rest: motion of the centre of mass, and of the links about it.
+        centre = m @ links.centres / mass
+        drift = m @ links.velocities / mass
+        lever = links.centres - centre
+        inner = links.velocities - drift
+        inertia = m @ np.abs(lever) ** 2 + link_inertia.sum()
+        inner_moment = m @ (lever.conj() * inner).imag + link_inertia @ links.rates
+
+        # In the world: the frame moves so that the momenta are those of the state.
+        x, y, theta, p_x, p_y, L = state
+        v = complex(p_x, p_y) / mass
+        rate = (L - inner_moment) / inertia
+        place = complex(x, y) + dt * v
+        theta = theta + dt * rate
         turn = np.exp(1j * theta)
-        origin, speed = place - turn * centre, v - turn * (drift + 1j * rate * centre)
-        placement = body.placed(links, origin, theta, speed, rate, height)
-        rates, link_v = rate + links.rates, v + turn * (inner + 1j * rate * lever)
-        kinetic = (m @ np.abs(link_v) ** 2 + bars @ rates**2) / 2
-        moved = Moved(
-            placement,
-            np.array([origin.real, origin.imag, theta]),
-            place,
-            alpha,
-            float(kinetic),
+        origin = place - turn * centre
+        velocity = v - turn * (drift + 1j * rate * centre)
+
+        link_v = v + turn * (inner + 1j * rate * lever)
+        link_rates = rate + links.rates
+        kinetic = (m @ np.abs(link_v) ** 2 + link_inertia @ link_rates**2) / 2
+        new_state = np.array([place.real, place.imag, theta, p_x, p_y, L])
+        return new_state, BodyState(
+            placement=body.placement(links, origin, theta, velocity, rate, height),
+            pose=np.array([origin.real, origin.imag, theta]),
+            centre=place,
+            alpha=alpha,
+            kinetic=float(kinetic),
         )
-        return np.array([place.real, place.imag, theta, px, py, L]), moved

@@ -1,4 +1,4 @@
-"""How the drag on a body comes back after it has turned round (paper Sec. IV A)."""
+"""Recovery of the drag on a body after it has reversed (paper Sec. IV A)."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from rft.grains.motions import Stroke
 
 
 class Drags(NamedTuple):
-    """Drag on a rod that goes to and fro, against its motion, in bins of its way.
+    """Drag on a rod that moves back and forth, against its motion, in bins of travel.
 
-    amplitude (m). travel: (n,), way so far at the middle of each bin, m. flank, ends: (n,), of the flank and of both ends
-    together, N."""
+    amplitude (m). travel: (n,), path length so far at the middle of each bin, m. flank,
+    ends: (n,), of the flank and of both ends together, N."""
 
     amplitude: float
     travel: np.ndarray
@@ -28,10 +28,12 @@ class Drags(NamedTuple):
 
 
 class Recovery(NamedTuple):
-    """Drag = plateau (at_once + (1 - at_once) (1 + m) / 2) with the mean direction m of `rft.effects.Transient`.
+    """Drag = plateau (at_once + (1 - at_once) (1 + m) / 2) with the mean direction m of
+    `rft.effects.Transient`.
 
-    plateau: drag after a long way, N. at_once: share of it. travel: m. start: m in the fresh bed. rms: of the bins about the
-    fit, over the plateau."""
+    plateau: drag after a long travel, N. at_once: share of it. travel: m, over which m
+    recovers. start: m in the fresh bed. rms: of the bins about the fit, over the
+    plateau."""
 
     plateau: float
     at_once: float
@@ -40,74 +42,100 @@ class Recovery(NamedTuple):
     rms: float
 
     def drag(self, travel: np.ndarray, amplitude: float) -> np.ndarray:
-        """Return the drag, N, at ways so far (n,), m, of a rod to and fro with an amplitude, m."""
+        """Return the drag, N, at path lengths so far (n,), m, of a rod that moves back
+        and forth with an amplitude, m."""
         m = mean_direction(travel, amplitude, self.travel, self.start)
         return self.plateau * (self.at_once + (1 - self.at_once) * (1 + m) / 2)
 
 
 def mean_direction(
-    way: np.ndarray, amplitude: float, travel: float, start: float
+    path: np.ndarray, amplitude: float, travel: float, start: float
 ) -> np.ndarray:
-    """Return the mean direction of travel, 1 for the present one, at ways so far (n,) of a rod that turns round at an
-    amplitude and then at every second one, from ``start``; lengths in one unit."""
+    """Return the mean direction of travel, 1 for the present one, at path lengths so
+    far (n,), all lengths in one unit.
+
+    The rod reverses at an amplitude and then at every second one. start: mean direction
+    at first. travel: over which it recovers."""
     length = travel / E_FOLDINGS
-    stretch = np.maximum(np.ceil((way / amplitude - 1) / 2), 0).astype(int)
-    out = np.empty_like(way)
-    for k in range(stretch.max() + 1):
-        begin, end = max(0, 2 * k - 1) * amplitude, (2 * k + 1) * amplitude
-        mine = stretch == k
-        out[mine] = 1 - (1 - start) * np.exp(-(way[mine] - begin) / length)
+    stroke = _reversals(path, amplitude).astype(int)
+    out = np.empty_like(path)
+    for k in range(stroke.max() + 1):
+        begin = max(0, 2 * k - 1) * amplitude
+        end = (2 * k + 1) * amplitude
+        inside = stroke == k
+        out[inside] = 1 - (1 - start) * np.exp(-(path[inside] - begin) / length)
+        # After the reversal, what was forwards is backwards.
         start = -(1 - (1 - start) * np.exp(-(end - begin) / length))
     return out
 
 
-def drags(run: Run, stroke: Stroke, half_width: float, bin_width: float) -> Drags:
-    """Return the drag on a round rod along x that went to and fro, in bins (m) of its way that divide its amplitude.
+def _reversals(path: np.ndarray, amplitude: float) -> np.ndarray:
+    """Return the number of reversals (n,) before path lengths so far, of a rod that
+    reverses at an amplitude and then at every second one."""
+    return np.maximum(np.ceil((path / amplitude - 1) / 2), 0)
 
-    half_width (m): of the rod, whose ends reach `END` of them as in `rft.grains.drag.flank_and_ends`. Samples in which
-    it turns are left out."""
-    a, way, sample = (
-        stroke.amplitude,
-        stroke.speed * run.t,
-        stroke.speed * (run.t[1] - run.t[0]),
+
+def drags(run: Run, stroke: Stroke, half_width: float, bin_width: float) -> Drags:
+    """Return the drag on a round rod along x that moved back and forth, in bins (m) of
+    travel that divide its amplitude.
+
+    half_width (m): of the rod, whose ends reach `END` of them as in
+    `rft.grains.drag.flank_and_ends`. Samples in which it reverses are left out."""
+    amplitude = stroke.amplitude
+    path = stroke.speed * run.t
+    sample = stroke.speed * (run.t[1] - run.t[0])
+    require(
+        path[-1] > amplitude,
+        "the body has not turned round",
+        instead="take a longer run",
     )
-    require(way[-1] > a, "the body has not turned round", instead="take a longer run")
-    turned = np.maximum(np.ceil((way / a - 1) / 2), 0)
-    whole = turned == np.maximum(np.ceil(((way - sample) / a - 1) / 2), 0)
+
+    # Samples between reversals, and the force on each sphere against the motion.
+    reversals = _reversals(path, amplitude)
+    has_one_direction = reversals == _reversals(path - sample, amplitude)
     direction = np.array([math.cos(stroke.angle), math.sin(stroke.angle)])
-    force = -((-1.0) ** turned)[:, None] * (run.profile[..., :2] @ direction)
-    flank = np.abs(run.along) < np.abs(run.along).max() + half_width - END * half_width
-    bins = np.floor((way - sample / 2) / bin_width + 1e-9).astype(int)
-    n = round(way[-1] / bin_width)
-    mean = lambda x: np.array([x[whole & (bins == k)].mean() for k in range(n)])
+    force = -((-1.0) ** reversals)[:, None] * (run.profile[..., :2] @ direction)
+
+    s = np.abs(run.arc_length)
+    is_flank = s < s.max() + half_width - END * half_width
+    number = np.floor((path - sample / 2) / bin_width + 1e-9).astype(int)
+    n_bins = round(path[-1] / bin_width)
+
+    def bin_means(x: np.ndarray) -> np.ndarray:
+        return np.array(
+            [x[has_one_direction & (number == k)].mean() for k in range(n_bins)]
+        )
+
     return Drags(
-        a,
-        (np.arange(n) + 0.5) * bin_width,
-        mean(force[:, flank].sum(1)),
-        mean(force[:, ~flank].sum(1)),
+        amplitude,
+        travel=(np.arange(n_bins) + 0.5) * bin_width,
+        flank=bin_means(force[:, is_flank].sum(1)),
+        ends=bin_means(force[:, ~is_flank].sum(1)),
     )
 
 
 def recovery(cases: Sequence[tuple[float, np.ndarray, np.ndarray]]) -> Recovery:
-    """Return the recovery that fits drags on one rod, (amplitude, travel (n,), drag (n,)) of each run, all runs alike."""
+    """Return the recovery that fits drags on one rod, each run with the same weight.
+
+    cases: (amplitude, travel (n,), drag (n,)) of each run, m, m and N."""
     from scipy.optimize import least_squares
 
     scale = float(np.mean([drag.mean() for _, _, drag in cases]))
-    longest = max(float(way[-1]) for _, way, _ in cases)
+    longest = max(float(travel[-1]) for _, travel, _ in cases)
 
-    def misfit(p):
-        law = Recovery(*p, rms=0.0)
-        return np.concatenate(
-            [
-                (law.drag(way, a) - drag) / (scale * math.sqrt(len(way)))
-                for a, way, drag in cases
-            ]
-        )
+    def misfit(parameters):
+        law = Recovery(*parameters, rms=0.0)
+        residuals = []
+        for amplitude, travel, drag in cases:
+            difference = law.drag(travel, amplitude) - drag
+            residuals.append(difference / (scale * math.sqrt(len(travel))))
+        return np.concatenate(residuals)
 
+    # Of plateau, at_once, travel and start.
     first = [scale, 0.2, longest / 5, 0.2]
-    low, high = [0.0, -1.0, longest / 1e3, -1.0], [9 * scale, 1.0, longest, 2.0]
-    found = least_squares(misfit, first, bounds=(low, high), x_scale=first)
-    plateau, *others = found.x.tolist()
-    return Recovery(
-        plateau, *others, rms=math.sqrt(2 * found.cost / len(cases)) * scale / plateau
-    )
+    low = [0.0, -1.0, longest / 1e3, -1.0]
+    high = [9 * scale, 1.0, longest, 2.0]
+    fit = least_squares(misfit, first, bounds=(low, high), x_scale=first)
+    plateau, at_once, travel, start = fit.x.tolist()
+    rms = math.sqrt(2 * fit.cost / len(cases)) * scale / plateau
+    return Recovery(plateau, at_once, travel, start, rms)

@@ -1,4 +1,5 @@
-"""Walking on grains: robots and their clocks, engines that compute walks, and wheels and screws at a given slip."""
+"""Walking on grains: robots and their clocks, engines that compute walks, and wheels
+and screws at a given slip."""
 
 from rft.terradynamics.walking.craft import Screws
 from rft.terradynamics.walking.engines import ENGINES, Fineness, Walker, engine

@@ -1,4 +1,5 @@
-"""A craft that two screws drive: a box over screws along its x axis, side by side, which rotate at a given rate."""
+"""A craft that two screws drive: a box over screws along its x axis, side by side,
+which rotate at a given rate."""
 
 from __future__ import annotations
 
@@ -22,8 +23,9 @@ PER_SQUARE = 10  # triangles of a screw over the square of the number of element
 class Screws(Robot):
     """Two screws under a box, which has all the mass. x forwards, y to the left, z up.
 
-    screw (-): the left screw; both drive forwards. pair (-): "mirrored", the right screw is the mirror image of the left and
-    rotates in the other direction, or "alike", both are the same and rotate in the same direction.
+    screw (-): the left screw; both drive forwards. pair (-): "mirrored", the right
+    screw is the mirror image of the left and rotates in the other direction, or
+    "alike", both are the same and rotate in the same direction.
 
     Examples
     --------
@@ -61,17 +63,21 @@ class Screws(Robot):
             f"pair must be one of {', '.join(PAIRS)}",
             value=self.pair,
         )
-        message = f"screws of radius {self.screw.radius:g} m meet: track must be more than {2 * self.screw.radius:g} m"
-        require(self.track > 2 * self.screw.radius, message)
+        radius = self.screw.radius
+        require(
+            self.track > 2 * radius,
+            f"screws of radius {radius:g} m meet: track must be more than "
+            f"{2 * radius:g} m",
+        )
 
     @property
     def screws(self) -> tuple[tuple[Screw, tuple[float, float, float]], ...]:
-        """The left and the right screw, each with its middle from the centre of mass, m."""
+        """The left and the right screw, each with its middle from the centre of mass,
+        m."""
+        y = self.track / 2
+        z = -self.drop
         right = self.screw.mirrored if self.pair == "mirrored" else self.screw
-        return (self.screw, (0.0, self.track / 2, -self.drop)), (
-            right,
-            (0.0, -self.track / 2, -self.drop),
-        )
+        return (self.screw, (0.0, y, z)), (right, (0.0, -y, z))
 
     @property
     def inertia(self) -> np.ndarray:
@@ -95,5 +101,6 @@ class Screws(Robot):
 
 @lru_cache(maxsize=2)
 def _mesh(screw: Screw, triangles: int) -> Mesh:
-    """Return the mesh of a screw, the same one for the scenes of a sweep over another parameter."""
+    """Return the mesh of a screw, the same one for the scenes of a sweep over another
+    parameter."""
     return screw.mesh(triangles)

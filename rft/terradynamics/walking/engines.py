@@ -1,4 +1,5 @@
-"""Engines that compute walks, by name. An engine is one module with the functions of `Engine`, and a line in `ENGINES`."""
+"""Engines that compute walks, by name. An engine is one module with the functions of
+`Engine`, and a line in `ENGINES`."""
 
 from __future__ import annotations
 
@@ -12,14 +13,14 @@ from rft.core.refusal import Refusal, formatted, require
 from rft.terradynamics.ground import Ground, GroundEffect, checked_effects, ground_of
 from rft.terradynamics.meshes.law import Spatial
 from rft.terradynamics.plates.stress import PlateStress
-from rft.terradynamics.walking.robot import SMALLEST, Robot, Tripod
+from rft.terradynamics.walking.robot import SMALLEST_ROUNDING, Robot, Tripod
 from rft.terradynamics.walking.stride import Walk, compute_stride
 
 
 @dataclass(frozen=True)
 class Walker:
-    """A robot, its clock and its ground. stress: a stress map of the vertical plane, or a law of three dimensions. effects:
-    aeration and grain inertia.
+    """A robot, its clock and its ground. stress: a stress map of the vertical plane, or
+    a law of three dimensions. effects: aeration and grain inertia.
 
     Examples
     --------
@@ -38,21 +39,19 @@ class Walker:
     effects: tuple[GroundEffect, ...] = ()
 
     def __post_init__(self):
-        for name, kind in (
-            ("robot", Robot),
-            ("gait", Tripod),
-            ("stress", PlateStress | Spatial),
+        for name, kind, spoken in (
+            ("robot", Robot, "Robot"),
+            ("gait", Tripod, "Tripod"),
+            ("stress", PlateStress | Spatial, "PlateStress or Spatial"),
         ):
-            value, kinds = (
-                getattr(self, name),
-                getattr(kind, "__name__", "PlateStress or Spatial"),
-            )
-            require(isinstance(value, kind), f"{name} must be a {kinds}", value=value)
+            value = getattr(self, name)
+            require(isinstance(value, kind), f"{name} must be a {spoken}", value=value)
         object.__setattr__(self, "effects", checked_effects(self.effects))
         for effect in self.effects:
             require(
                 effect.walks,
-                f"walking takes the effects aeration and grain-inertia, not {effect.kind}",
+                "walking takes the effects aeration and grain-inertia, not "
+                f"{effect.kind}",
                 instead="drop it",
             )
 
@@ -66,7 +65,8 @@ class Walker:
 class Fineness:
     """Numerical settings of a walk.
 
-    engine (-): planar or mujoco; by default planar, but mujoco for robots and ground of three dimensions.
+    engine (-): planar or mujoco; by default planar, but mujoco for robots and ground of
+    three dimensions.
 
     Examples
     --------
@@ -91,9 +91,9 @@ class Fineness:
     rounding: Annotated[
         float,
         Number(
-            SMALLEST, 0.1, "m/s",
-            "speed below which drag falls off in proportion to speed; of slow legs it is no more than 5 % of the speed of "
-            "their ends",
+            SMALLEST_ROUNDING, 0.1, "m/s",
+            "speed below which drag falls off in proportion to speed; of slow legs it "
+            "is no more than 5 % of the speed of their ends",
         ),
     ] = 3e-3  # fmt: skip
     duration: Annotated[
@@ -109,9 +109,12 @@ class Fineness:
         check_numbers(self)
 
 
-class Refined(NamedTuple):
-    """Numerics of which a walk tells how far it is off. setting: the one that differs, "steps" or "elements". factor: error
-    of the speed over its change, at least. cost: of the strides with them over that of a walk's."""
+class Variation(NamedTuple):
+    """Numerics that differ in one setting, for an estimate of its error.
+
+    setting: "steps" or "elements". factor: error of the speed over its change with
+    these numerics, at least. cost: of a walk's strides with these numerics over their
+    cost without."""
 
     numerics: Fineness
     setting: str
@@ -119,13 +122,15 @@ class Refined(NamedTuple):
     cost: float
 
 
-TO_COME = 1.5  # error over the change with twice the elements; up to 1.49 measured, 4/3 for order 2
+# Error of the speed over its change with twice the elements; up to 1.49 measured, 4/3
+# for order 2.
+ELEMENT_FACTOR = 1.5
 
 
-def with_more_elements(numerics: Fineness, cost: float) -> Refined:
+def with_more_elements(numerics: Fineness, cost: float) -> Variation:
     """Return numerics with twice the elements."""
-    elements = min(1000, 2 * numerics.elements)
-    return Refined(replace(numerics, elements=elements), "elements", TO_COME, cost)
+    finer = replace(numerics, elements=min(1000, 2 * numerics.elements))
+    return Variation(finer, "elements", ELEMENT_FACTOR, cost)
 
 
 class Engine(Protocol):
@@ -133,8 +138,9 @@ class Engine(Protocol):
 
     ORDER: int
 
-    def refined(self, numerics: Fineness) -> list[Refined]:
-        """Return the numerics by which errors are estimated, at least one for each setting."""
+    def variations(self, numerics: Fineness) -> list[Variation]:
+        """Return the numerics by which errors are estimated, at least one for each
+        setting."""
         ...
 
     def refuse(self, walker: Walker) -> None:
@@ -151,8 +157,9 @@ class Engine(Protocol):
     ) -> list[Walk]:
         """Return the walks of walkers from rest, with their speeds at the limit cycle.
 
-        A walk lasts ``cycles`` cycles, by default the duration of the numerics, or until the robot's end. progress:
-        receives the finished fraction. advance: computes a stride, as `rft.terradynamics.walking.stride.compute_stride`."""
+        A walk lasts ``cycles`` cycles, by default the duration of the numerics, or
+        until the robot's end. progress: receives the finished fraction. advance:
+        computes a stride, as `rft.terradynamics.walking.stride.compute_stride`."""
         ...
 
     def rerun(
@@ -163,20 +170,26 @@ class Engine(Protocol):
         cycles: int | None = None,
         advance: Callable = compute_stride,
     ) -> list[Walk]:
-        """Return known walks with other numerics. A walk with a limit cycle starts near it, and only the fields of the limit
-        cycle change; others are computed from rest."""
+        """Return given walks with other numerics.
+
+        A walk with a limit cycle starts near it, and only the fields of the limit cycle
+        change; others are computed from rest."""
         ...
 
     def step_cost(
         self, walkers: Sequence[Walker], numerics: Fineness, seconds: float
     ) -> tuple[float, float]:
-        """Return s of computing in a time step of equal walkers side by side, and number of evaluations of forces for one,
-        from the first steps of their walks: those of a stride, or as many as ``seconds`` s of computing allow."""
+        """Return the cost of a time step of equal walkers side by side: processor
+        seconds for all of them, and evaluations of forces for one.
+
+        They are measured on the first steps of the walks: all steps of a stride, or as
+        many as ``seconds`` s of computing allow."""
         ...
 
 
 def engine(name: str) -> Engine:
-    """Return the engine of a name; ValueError for unknown engines and those that are not installed.
+    """Return the engine of a name; ValueError for unknown engines and those that are
+    not installed.
 
     Examples
     --------

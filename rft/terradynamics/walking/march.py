@@ -1,8 +1,9 @@
-"""Steps in time of many robots at once, each at its own rate (`rft.terradynamics.walking.sdirk`).
+"""Time steps of many robots at once, each at its own rate
+(`rft.terradynamics.walking.sdirk`).
 
-Steps end where the clock's rate jumps. Some robots stick where others slip, and take ten times as many iterations. So no
-robot waits for another: each evaluation of forces is a batch of all robots under way, every one in its own step, stage and
-iteration."""
+Steps end where the clock's rate jumps. Robots that stick take ten times as many
+iterations as robots that slip. So no robot waits for another: each evaluation of forces
+is a batch of all robots under way, every one in its own step, stage and iteration."""
 
 from __future__ import annotations
 
@@ -26,45 +27,48 @@ from rft.terradynamics.walking.sdirk import (
     start_of_step,
 )
 
-UNENDING = (
-    np.inf,
-    np.inf,
-)  # `rft.terradynamics.walking.sdirk.has_ended`: robots neither sink nor fly
+# End heights of `rft.terradynamics.walking.sdirk.has_ended` that no robot reaches.
+NO_END = (np.inf, np.inf)
 
 
 def march(
-    robots: Robots, index, state: State, phases, rate_phases, ends=UNENDING
+    robots: Robots, index, state: State, phases, rate_phases, end_heights=NO_END
 ) -> tuple[State, np.ndarray]:
-    """Return the states after every step (S, B) of the robots ``index`` from a state, and how often forces were evaluated
-    (B,).
+    """Return the states after every step (S, B) of the robots ``index`` from a state,
+    and the number of evaluations of forces for each (B,).
 
     The steps go from phase to phase (S + 1,), in cycles. In each the legs rotate at the
-    rates of the clock at ``rate_phases`` (S,), which tell the side of a kink. ends: see
-    `rft.terradynamics.walking.sdirk.has_ended`; a robot at an end stays there."""
-    index, phases = np.asarray(index), np.asarray(phases)
+    rates of the clock at ``rate_phases`` (S,), which determine the side of a kink.
+    end_heights: as for `rft.terradynamics.walking.sdirk.has_ended`; a robot at an end
+    stays there."""
+    index = np.asarray(index)
+    phases = np.asarray(phases)
     starts = np.broadcast_to(phases[:-1, None], (len(rate_phases), len(index)))
     angles, rates = robots.leg_motion(
         starts, np.broadcast_to(np.asarray(rate_phases)[:, None], starts.shape), index
     )
     lengths = np.diff(phases)[:, None] / robots.frequency[index, 0]
-    ends = np.stack([np.broadcast_to(x, len(index)) for x in ends])
+    end_heights = np.stack([np.broadcast_to(x, len(index)) for x in end_heights])
+
     if compiles("auto", robots.elements.law):
+        # Only here: the import loads numba.
         from rft.terradynamics.walking.compiled import run_steps
     else:
         run_steps = run_steps_by_numpy
-    states, tries = run_steps(
-        robots, index, state.packed(), angles, rates, lengths, ends, EFFORT
+    states, evaluations = run_steps(
+        robots, index, state.to_array(), angles, rates, lengths, end_heights, EFFORT
     )
-    return State.unpacked(states), tries
+    return State.from_array(states), evaluations
 
 
 def step(
     robots: Robots, state: State, phase: float, rate_phase: float, dt: float
 ) -> State:
-    """Return the state of robots of one frequency after a time step dt, s, from a phase, with the legs at the rates of the
-    clock at ``rate_phase``."""
-    phases = phase, phase + dt * robots.frequency[0, 0]
-    return march(robots, range(len(robots)), state, phases, [rate_phase])[0].take(0)
+    """Return the state of robots of one frequency after a time step dt, s, from a
+    phase, with the legs at the rates of the clock at ``rate_phase``."""
+    phases = (phase, phase + dt * robots.frequency[0, 0])
+    states, _ = march(robots, range(len(robots)), state, phases, [rate_phase])
+    return states.take(0)
 
 
 def run_steps_by_numpy(
@@ -74,77 +78,108 @@ def run_steps_by_numpy(
     angles,
     rates,
     lengths,
-    ends,
+    end_heights,
     effort: Effort,
 ):
-    """Return the states after each step (S, B, 11) and the numbers of evaluations (B,), from packed states (B, 11).
+    """Return the states after each step (S, B, 11) and the numbers of evaluations (B,),
+    from states as arrays (B, 11).
 
-    angles: (S, B, K), of the legs at the beginning of each step, rad. rates: (S, B, K), rad/s. lengths: (S, B), s. ends:
-    (2, B)."""
+    angles: (S, B, K), of the legs at the beginning of each step, rad. rates: (S, B, K),
+    rad/s. lengths: (S, B), s. end_heights: (2, B), m."""
     count, size = lengths.shape
-    states, tries = np.empty((count, *start.shape)), np.zeros(size, int)
-    # Of the robots under way: their columns, the numbers of their steps, and where they are in them.
-    column, number, steps = np.arange(size), np.zeros(size, int), unpacked(start)
+    states = np.empty((count, *start.shape))
+    evaluations = np.zeros(size, int)
+
+    # Robots under way: their columns, the numbers of their steps, and where they are in
+    # them.
+    column = np.arange(size)
+    number = np.zeros(size, int)
+    steps = steps_from_array(start)
     while column.size:
-        robot, length = index[column], lengths[number, column]
-        h, time = steps.stage.part * length, (stage_time(steps.stage) * length)[:, None]
-        width, rate = (
-            gather(effort.widths, steps.newton.width, 0),
-            rates[number, column],
-        )
-        ground, k = robots.ground_under(robot, width), GAMMA * h
-        residual, slopes, power = robots.residual(
-            robot, steps.stage.base, steps.stage.start, steps.newton.trial, angles[number, column] + time * rate, rate, k,
-            ground,
+        robot = index[column]
+        length = lengths[number, column]
+        h = steps.stage.part * length
+        steps, is_over = _advance_stages(
+            robots, robot, steps, h, length, angles[number, column],
+            rates[number, column], effort,
         )  # fmt: skip
-        tolerance = TOLERANCE * ground.rounding
-        newton, solved, failed = newton_step(
-            steps.newton,
-            residual,
-            slopes,
-            power,
-            k,
-            robots.reach[robot],
-            tolerance,
-            effort,
-        )
-        steps = Step(steps.accepted, steps.stage, newton)
-        tries[column] += 1
-        if not (solved | failed).any():
+        evaluations[column] += 1
+        if not is_over.any():
             continue
-        steps, over = next_problem(steps, solved, failed, tolerance, k, h, effort)
-        if over.any():
-            row, pose = packed(steps), steps.accepted.pose
-            states[number[over], column[over]] = row[over]
-            number = number + over
-            ended = over & has_ended(pose[1], pose[2], ends[:, column])
-            for j in np.flatnonzero(ended):
-                states[number[j] :, column[j]] = row[j]
-            active = ~ended & (number < count)
-            if not active.all():
-                steps, column, number = (
-                    select(steps, active),
-                    column[active],
-                    number[active],
-                )
-    return states, tries
+
+        # Robots whose step is over store it. Those at an end stay there.
+        pose = steps.accepted.pose
+        row = accepted_array(steps)
+        states[number[is_over], column[is_over]] = row[is_over]
+        number = number + is_over
+        ended = is_over & has_ended(pose[1], pose[2], end_heights[:, column])
+        for j in np.flatnonzero(ended):
+            states[number[j] :, column[j]] = row[j]
+
+        active = ~ended & (number < count)
+        if not active.all():
+            steps = take_rows(steps, active)
+            column = column[active]
+            number = number[active]
+    return states, evaluations
 
 
-def unpacked(state: np.ndarray) -> Step:
-    """Return robots in packed states (B, 11) at the start of a time step."""
+def _advance_stages(
+    robots: Robots,
+    index,
+    steps: Step,
+    h: np.ndarray,
+    length: np.ndarray,
+    start_angle: np.ndarray,
+    rate: np.ndarray,
+    effort: Effort,
+) -> tuple[Step, np.ndarray]:
+    """Return robots after one evaluation of forces, and whether their time steps are
+    over (B,).
+
+    h, length: (B,), s, of the present part of the step and of the step. start_angle:
+    (B, K), rad, of the legs at the beginning of the step. rate: (B, K), rad/s."""
+    k = GAMMA * h
+    width = gather(effort.widths, steps.newton.width, 0)
+    ground = robots.ground_under(index, width)
+    tolerance = TOLERANCE * ground.rounding
+    time = (stage_time(steps.stage) * length)[:, None]
+    residual, slopes, power = robots.residual(
+        index,
+        steps.stage.base,
+        steps.stage.start,
+        steps.newton.trial,
+        start_angle + time * rate,
+        rate,
+        k,
+        ground,
+    )
+    newton, is_solved, has_failed = newton_step(
+        steps.newton, residual, slopes, power, k, robots.reach[index], tolerance, effort
+    )
+    steps = Step(steps.accepted, steps.stage, newton)
+    if not (is_solved | has_failed).any():
+        return steps, np.zeros(len(index), bool)
+    return next_problem(steps, is_solved, has_failed, tolerance, k, h, effort)
+
+
+def steps_from_array(state: np.ndarray) -> Step:
+    """Return robots in the states of an array (B, 11) at the start of a time step."""
     x = tuple(state.T)
     return start_of_step(x[:3], x[3:6], *x[6:])
 
 
-def packed(steps: Step) -> np.ndarray:
-    """Return the accepted states (B, 11)."""
+def accepted_array(steps: Step) -> np.ndarray:
+    """Return the accepted states as an array (B, 11)."""
     pose, twist, *sums = steps.accepted
     return np.stack([*pose, *twist, *sums], -1)
 
 
-def select(values: Any, rows: Any) -> Any:
+def take_rows(values: Any, rows: Any) -> Any:
     """Return these rows of all arrays in nested tuples."""
     if not isinstance(values, tuple):
         return values[rows]
-    parts = [select(x, rows) for x in values]
-    return type(values)(*parts) if hasattr(values, "_fields") else tuple(parts)
+    parts = [take_rows(x, rows) for x in values]
+    if hasattr(values, "_fields"):
+        return type(values)(*parts)
+    return tuple(parts)

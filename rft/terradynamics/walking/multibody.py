@@ -1,8 +1,7 @@
 """Steps of the bodies of a MuJoCo model in sand.
 
-MuJoCo takes the steps, with the grains' forces of `rft.mujoco`: those of the velocities
-that a step ends with. They are of order 1, so a time step of a walk consists of some of
-them.
+MuJoCo takes the steps, with the grains' forces of `rft.mujoco` at the velocities that a
+step ends with. Its steps are of order 1, so a time step of a walk consists of several.
 """
 
 from __future__ import annotations
@@ -36,17 +35,27 @@ ROTATING = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL)
 class Multibody:
     """A MuJoCo model in sand, time step after time step.
 
-    model: compiled; gravity along -z, the surface at z = 0; it stays as it is.
-    surfaces: those that touch the ground, from
-    `rft.terradynamics.walking.geoms.surfaces` or `Surface`. Their geoms touch grains
-    and nothing else, no floor either. grains: the ground. control: function
-    (time, rate_time) -> controls (nu,) of the actuators at a time, s, by the rates of a
-    clock at ``rate_time``, which tells the side of a kink; None for the controls in the
-    data. substeps: steps of MuJoCo, by its integrator implicitfast, in a time step.
-
-        craft = Multibody(model, surfaces(model, {"hull": mesh}), Grains(Spatial(xi_n=3e5)))
+        grains = Grains(Spatial(xi_n=3e5))
+        craft = Multibody(model, surfaces(model, {"hull": mesh}), grains)
         while craft.data.time < 10.0:
             craft.step(0.01)
+
+    Parameters
+    ----------
+    model : MjModel
+        Compiled; gravity along -z, the surface at z = 0. It stays as it is.
+    surfaces : sequence of Surface
+        Those that touch the ground, for example from
+        `rft.terradynamics.walking.geoms.surfaces`. Their geoms touch grains and nothing
+        else, no floor either.
+    grains : Grains
+        The ground.
+    control : callable, optional
+        Returns the controls (nu,) of the actuators for (time, rate_time): at a time, s,
+        by the rates of a clock at ``rate_time``, which determines the side of a kink.
+        By default the controls are those in the data.
+    substeps : int
+        Steps of MuJoCo, by its integrator implicitfast, in a time step.
 
     Attributes
     ----------
@@ -63,6 +72,8 @@ class Multibody:
         lacks at most.
     iterations : int
         Of Newton's method for the grains' forces, in all.
+    size : array (nv,)
+        Speed, m/s, per unit of each velocity: 1, or a reach, m, for rotations.
     """
 
     def __init__(
@@ -88,15 +99,17 @@ class Multibody:
         model.opt.enableflags |= ENERGY
         model.opt.disableflags |= NO_RESET
         model.opt.integrator = IMPLICIT_FAST
-        self.model, self.data, self.facets = (
-            model,
-            mujoco.MjData(model),
-            Facets(surfaces),
-        )
-        self.control, self.substeps = control, substeps
+        self.model = model
+        self.data = mujoco.MjData(model)
+        self.facets = Facets(surfaces)
+        self.control = control
+        self.substeps = substeps
         self.work = self.loss = self.defect = self.residual = 0.0
         self.unsolved = self.iterations = 0
-        self._bed, self._row = bed_under(model, surfaces, grains), NO_ROW
+        self._bed = bed_under(model, surfaces, grains)
+        self._row = NO_ROW
+
+        # The structure of `qDeriv`, which older versions of MuJoCo keep in the data.
         structure = model if hasattr(model, "D_rownnz") else self.data
         self._slope_rows = np.repeat(np.arange(model.nv), structure.D_rownnz)
         self._slope_columns = np.array(structure.D_colind)
@@ -106,12 +119,14 @@ class Multibody:
     def _sizes(self) -> np.ndarray:
         """Return the speed, m/s, per unit of each velocity (nv,): 1, or a reach, m, for
         rotations."""
-        model, data = self.model, self.data
+        model = self.model
+        data = self.data
         places = data.xpos[self.facets.bodies]
-        reach = float(
-            (np.linalg.norm(places - places.mean(0), axis=1) + self.facets.reach).max()
-        )
-        size = np.where(np.isin(model.jnt_type[model.dof_jntid], ROTATING), reach, 1.0)
+        distance = np.linalg.norm(places - places.mean(0), axis=1)
+        reach = float((distance + self.facets.reach).max())
+        is_rotation = np.isin(model.jnt_type[model.dof_jntid], ROTATING)
+        size = np.where(is_rotation, reach, 1.0)
+        # The last three velocities of a free joint are rotations.
         for joint in np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE):
             first = model.jnt_dofadr[joint] + 3
             size[first : first + 3] = reach
@@ -148,7 +163,9 @@ class Multibody:
 
     @contextmanager
     def in_sand(self) -> Iterator[None]:
-        """Put the sand under the model for some steps, of which each does so by itself otherwise, in a millisecond."""
+        """Put the sand under the model for several steps.
+
+        Otherwise each step does so by itself, which takes a millisecond."""
         if self._row != NO_ROW:
             yield
             return
@@ -161,16 +178,21 @@ class Multibody:
             self._row = NO_ROW
 
     def step(self, h: float, rate_time: float | None = None) -> None:
-        """Take a time step h, s, with the controls' rates at ``rate_time``, s, by default the middle of the step."""
+        """Take a time step h, s, with the controls' rates at ``rate_time``, s, by
+        default the middle of the step."""
         with self.in_sand():
             self._step(h, rate_time)
 
     def _step(self, h: float, rate_time: float | None) -> None:
         """Take a time step in the sand."""
-        model, data = self.model, self.data
-        begin, before = data.time, installed.effort(self._row)
-        rate_time = begin + h / 2 if rate_time is None else rate_time
-        model.opt.timestep = dt = h / self.substeps
+        model = self.model
+        data = self.data
+        begin = data.time
+        before = installed.effort(self._row)
+        if rate_time is None:
+            rate_time = begin + h / 2
+        dt = h / self.substeps
+        model.opt.timestep = dt
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Note)  # unsolved steps are counted
             for k in range(self.substeps):
@@ -195,9 +217,11 @@ class Multibody:
         (nv,).
 
         The step moves bodies by its last velocities, at which forces of motors and
-        dampers act, too."""
-        model, data = self.model, self.data
-        velocity, change = data.qvel, data.qvel - before
+        dampers act as well."""
+        model = self.model
+        data = self.data
+        velocity = data.qvel
+        change = data.qvel - before
         by_change = data.qDeriv * change[self._slope_columns]
         implicit = np.bincount(self._slope_rows, by_change, model.nv)
         damping = model.dof_damping * change
@@ -207,12 +231,14 @@ class Multibody:
         self.loss -= dt * float(velocity @ losses)
 
     def _count(self, before: installed.Effort, dt: float) -> None:
-        """Add what the steps of a time step have cost and lack, from the effort before
-        them."""
+        """Add the iterations and the defects of the steps of a time step, from the
+        effort before them."""
         now = installed.effort(self._row)
+        # Residuals are relative to the speed of the bodies and of a fall for a step.
         mass = float(self.model.body_mass.sum())
         fall = dt * float(np.linalg.norm(self.model.opt.gravity))
-        speed = (2 * float(self.data.energy[1]) / max(mass, 1e-300)) ** 0.5 + fall
+        kinetic = float(self.data.energy[1])
+        speed = (2 * kinetic / max(mass, 1e-300)) ** 0.5 + fall
         unsolved = now.unsolved - before.unsolved
         self.iterations += now.iterations - before.iterations
         self.unsolved += unsolved
@@ -226,44 +252,53 @@ def bed_under(
 ) -> Bed:
     """Return the sand under surfaces of a model, each in the place of its geom, or of
     its body's first one."""
-    own: dict[int, list[Surface]] = {}
+    surfaces_of_geoms: dict[int, list[Surface]] = {}
     for surface in surfaces:
-        first = model.body_geomadr[surface.body]
-        geom = int(first if surface.geom is None else surface.geom)
+        geom = surface.geom
+        if geom is None:
+            geom = int(model.body_geomadr[surface.body])
         require(geom >= 0, f"the body {surface.body} of a surface has no geom")
-        own.setdefault(geom, []).append(surface)
-    along = [_faces_of_geom(model, geom, parts) for geom, parts in own.items()]
+        surfaces_of_geoms.setdefault(int(geom), []).append(surface)
+    geom_faces = [
+        _faces_of_geom(model, geom, own) for geom, own in surfaces_of_geoms.items()
+    ]
     return Bed.under_faces(
-        model, [*own], along, (grains.law,), EVERYWHERE, grains.ground
+        model,
+        [*surfaces_of_geoms],
+        geom_faces,
+        (grains.law,),
+        EVERYWHERE,
+        grains.ground,
     )
 
 
 def _faces_of_geom(model: mujoco.MjModel, geom: int, surfaces: Sequence[Surface]):
     """Return the faces of surfaces in the frame of a geom."""
-    turn = np.zeros(9)
-    mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
-    turn = turn.reshape(3, 3)
+    rotation = np.zeros(9)
+    mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
+    rotation = rotation.reshape(3, 3)
     corners = np.concatenate([s.corners for s in surfaces]) - model.geom_pos[geom]
     normals = np.concatenate([s.normals for s in surfaces])
     sheet = np.concatenate([np.full(len(s.corners), s.sheet) for s in surfaces])
-    return faces(corners @ turn, normals @ turn, sheet)
+    return faces(corners @ rotation, normals @ rotation, sheet)
 
 
 def _remove_contacts(model: mujoco.MjModel, surfaces: Sequence[Surface]) -> None:
     """Remove all contacts of the surfaces' geoms from a model; ValueError where a
     <pair> names one."""
-    own = np.zeros(model.ngeom, bool)
+    in_sand = np.zeros(model.ngeom, bool)
     for surface in surfaces:
-        own |= (
-            model.geom_bodyid == surface.body
-            if surface.geom is None
-            else np.arange(model.ngeom) == surface.geom
-        )
-    model.geom_contype[own] = model.geom_conaffinity[own] = 0
-    paired = own[model.pair_geom1] | own[model.pair_geom2]
+        if surface.geom is None:
+            in_sand |= model.geom_bodyid == surface.body
+        else:
+            in_sand[surface.geom] = True
+    model.geom_contype[in_sand] = 0
+    model.geom_conaffinity[in_sand] = 0
+    is_paired = in_sand[model.pair_geom1] | in_sand[model.pair_geom2]
     require(
-        not paired.any(),
-        "a <pair> of <contact> names a geom that touches the ground, and no other thing",
+        not is_paired.any(),
+        "a <pair> of <contact> names a geom that touches the ground, and no other "
+        "thing",
         instead="drop it",
     )
 

@@ -13,7 +13,7 @@ from rft.terradynamics.ground import Ground
 from rft.terradynamics.plates.stress import PlateStress
 from rft.terradynamics.walking.engines import (
     Fineness,
-    Refined,
+    Variation,
     Walker,
     with_more_elements,
 )
@@ -30,9 +30,10 @@ from rft.terradynamics.walking.stride import (
     STUCK,
     Strides,
     Walk,
+    WalksFromRest,
     compute_stride,
     cycles_to_settle,
-    from_rest,
+    walk_from_rest,
 )
 
 ORDER = 2  # of the time steps
@@ -40,9 +41,8 @@ ORDER = 2  # of the time steps
 
 def refuse(walker: Walker) -> None:
     """Raise ValueError for a walker that this engine cannot compute."""
-    planar = isinstance(walker.robot, Rhex | Roller)
     require(
-        planar,
+        isinstance(walker.robot, Rhex | Roller),
         f"the planar engine knows no {type(walker.robot).__name__} robot",
         instead="use ``engine`` mujoco",
     )
@@ -52,12 +52,14 @@ def refuse(walker: Walker) -> None:
     )
 
 
-def refined(numerics: Fineness) -> list[Refined]:
-    """Return half and three quarters of the steps, as one change alone may be small by chance, and twice the elements."""
-    few = [max(8, numerics.steps * quarters // 4) for quarters in (2, 3)]
+def variations(numerics: Fineness) -> list[Variation]:
+    """Return half and three quarters of the steps, as one change alone may be small by
+    chance, and twice the elements."""
+    half = max(8, numerics.steps // 2)
+    three_quarters = max(8, numerics.steps * 3 // 4)
     return [
-        Refined(replace(numerics, steps=few[0]), "steps", 1.0, 0.5),
-        Refined(replace(numerics, steps=few[1]), "steps", 1.0, 0.75),
+        Variation(replace(numerics, steps=half), "steps", 1.0, 0.5),
+        Variation(replace(numerics, steps=three_quarters), "steps", 1.0, 0.75),
         with_more_elements(numerics, 1.5),
     ]
 
@@ -69,10 +71,11 @@ def walk(
     progress: Callable | None = None,
     advance: Callable = compute_stride,
 ) -> list[Walk]:
-    """Return the walks of walkers; see `rft.terradynamics.walking.engines.Engine.walk`."""
-    walks: list = [None] * len(walkers)
+    """Return the walks of walkers; see
+    `rft.terradynamics.walking.engines.Engine.walk`."""
     for walker in walkers:
         refuse(walker)
+    walks: list = [None] * len(walkers)
     batches = _batches(walkers, numerics)
     for k, members in enumerate(batches):
 
@@ -80,62 +83,54 @@ def walk(
             if progress:
                 progress((k + fraction) / len(batches))
 
-        for j, one in zip(
-            members,
-            _walk([walkers[j] for j in members], numerics, cycles, report, advance),
-        ):
+        batch = [walkers[j] for j in members]
+        batch_walks = _walk_batch(batch, numerics, cycles, report, advance)
+        for j, one in zip(members, batch_walks):
             walks[j] = one
     return walks
 
 
 def _batches(walkers: Sequence[Walker], numerics: Fineness) -> list[list[int]]:
-    """Return the indices of walkers that can be computed as one batch, a list for each batch."""
+    """Return the indices of walkers that can be computed as one batch, a list for each
+    batch."""
     batches: dict = {}
-    for k, w in enumerate(walkers):
-        outlines = [
-            o
-            for o in (w.robot.leg(numerics.elements), w.robot.belly(numerics.elements))
-            if o is not None
-        ]
-        shapes = tuple(
-            (o.elements, o.closed, o.smooth_normals is None) for o in outlines
-        )
-        key = repr(
-            (
-                type(w.robot),
-                len(w.robot.hips),
-                shapes,
-                replace(w.stress, zeta=1.0),
-                w.gait.kinks,
-            )
-        )
+    for k, walker in enumerate(walkers):
+        key = _batch_key(walker, numerics.elements)
         batches.setdefault(key, []).append(k)
     return list(batches.values())
+
+
+def _batch_key(walker: Walker, elements: int) -> str:
+    """Return a text that is equal for walkers that can be computed as one batch."""
+    robot = walker.robot
+    shapes = []
+    for outline in (robot.leg(elements), robot.belly(elements)):
+        if outline is not None:
+            is_plain = outline.smooth_normals is None
+            shapes.append((outline.elements, outline.closed, is_plain))
+    stress = replace(walker.stress, zeta=1.0)
+    key = (type(robot), len(robot.hips), tuple(shapes), stress, walker.gait.kinks)
+    return repr(key)
 
 
 def _strides(
     walkers: Sequence[Walker], numerics: Fineness, advance: Callable = compute_stride
 ) -> Strides:
     """Return the strides of a batch of walkers."""
-    stress, grounds = replace(walkers[0].stress, zeta=1.0), [w.ground for w in walkers]
+    # One law for all: the factors zeta go into the strength of the ground.
+    stress = replace(walkers[0].stress, zeta=1.0)
+    grounds = [w.ground for w in walkers]
     strength = np.array([g.strength * w.stress.zeta for g, w in zip(grounds, walkers)])
-    ground = Ground(
-        strength,
-        np.array([g.flux for g in grounds]),
-        numerics.rounding,
-        np.sin(stress.grazing),
-    )
-    robots, gaits = [w.robot for w in walkers], [w.gait for w in walkers]
-    return Strides(
-        Robots(robots, gaits, stress, ground, numerics.elements),
-        robots,
-        gaits,
-        numerics.steps,
-        advance,
-    )
+    flux = np.array([g.flux for g in grounds])
+    ground = Ground(strength, flux, numerics.rounding, np.sin(stress.grazing))
+
+    designs = [w.robot for w in walkers]
+    gaits = [w.gait for w in walkers]
+    robots = Robots(designs, gaits, stress, ground, numerics.elements)
+    return Strides(robots, designs, gaits, numerics.steps, advance)
 
 
-def _walk(
+def _walk_batch(
     walkers: Sequence[Walker],
     numerics: Fineness,
     cycles: int | None,
@@ -144,81 +139,94 @@ def _walk(
 ) -> list[Walk]:
     """Return the walks of one batch of walkers."""
     strides = _strides(walkers, numerics, advance)
-    durations = (
-        cycles / strides.frequency
-        if cycles
-        else np.full(len(walkers), numerics.duration)
-    )
-    state, blocks, computed, status, period = from_rest(strides, durations, progress)
-    on = np.flatnonzero(np.isin(status, ("", "periodic")))
-    limits = [Limit(state.take([k]), period[k]) for k in on]
-    at_limit = (
-        dict(zip(on, _at_limits([walkers[k] for k in on], numerics, limits, advance)))
-        if on.size
-        else {}
-    )
+    if cycles:
+        durations = cycles / strides.frequency
+    else:
+        durations = np.full(len(walkers), numerics.duration)
+    from_rest = walk_from_rest(strides, durations, progress)
+
+    # Robots that are at no end go on from where they are to their limit cycles.
+    walking = np.flatnonzero(np.isin(from_rest.status, ("", "periodic")))
+    limits = [Limit(from_rest.state.take([k]), from_rest.period[k]) for k in walking]
+    limit_fields = {}
+    if walking.size:
+        members = [walkers[k] for k in walking]
+        fields = _fields_at_limits(members, numerics, limits, advance)
+        limit_fields = dict(zip(walking, fields))
+
     walks = []
     for k in range(len(walkers)):
-        rows = _rows(
-            blocks[k], strides.cycle if status[k] == "periodic" else 0, durations[k]
-        )
-        states = State(
-            rows[:, 1:4],
-            rows[:, 4:7],
-            rows[:, 7],
-            rows[:, 8],
-            *np.zeros((3, len(rows))),
-        )
-        energy, time = strides.robots.energy(states, k), rows[-1, 0]
-        speed = rows[-1, 1] / time if time else 0.0
-        own = (
-            float(speed),
-            str(status[k]),
-            0.0,
-            False,
-            0.0,
-            None,
-            int(state.unsolved[k]),
-            float(state.residual[k]),
-        )
-        one = Walk(rows[:, 0], *states[:4], energy, *own)
-        one = one._replace(**at_limit[k]) if k in at_limit else one
+        one = _walk_until(strides, from_rest, k, durations[k])
+        one = one._replace(**limit_fields.get(k, {}))
         if one.periodic and one.status == "walking":
-            last = state.take([k]) if status[k] == "" else None
-            one = one._replace(
-                settling_time=_settling_time(
-                    strides, k, [b[-1, 1] for b in blocks[k]], last, one
-                )
-            )
-        walks.append(one._replace(cycles=one.cycles + computed[k] * strides.period))
+            settling_time = _settling_time(strides, from_rest, k, one)
+            one = one._replace(settling_time=settling_time)
+        cycles_from_rest = from_rest.strides[k] * strides.period
+        walks.append(one._replace(cycles=one.cycles + cycles_from_rest))
     return walks
 
 
-def _settling_time(
-    strides: Strides, k: int, x: list, last: State | None, walk: Walk
-) -> float:
-    """Return `Walk.settling_time` from the places x, m, of robot k at the ends of its strides from rest.
-
-    last: its state at the last one, from which the slopes at the limit predict further strides; None where the strides
-    repeat themselves."""
-    cycle = 1.0 / strides.frequency[k]
-    if last is not None:
-        moves = predicted_progress(
-            strides, walk.limit, last, k, walk.speed * cycle / strides.cycle
-        )
-        x = np.append(x, x[-1] + moves.cumsum())
-    return float(
-        cycles_to_settle(np.diff(x[:: strides.cycle]), walk.speed * cycle) * cycle
+def _walk_until(
+    strides: Strides, from_rest: WalksFromRest, k: int, duration: float
+) -> Walk:
+    """Return the walk of robot k from rest until a duration, s, without its limit
+    cycle."""
+    repeated = strides.cycle if from_rest.status[k] == "periodic" else 0
+    rows = _rows_until(from_rest.blocks[k], repeated, duration)
+    t = rows[:, 0]
+    zeros = np.zeros((3, len(rows)))
+    states = State(rows[:, 1:4], rows[:, 4:7], rows[:, 7], rows[:, 8], *zeros)
+    speed = 0.0
+    if t[-1]:
+        speed = rows[-1, 1] / t[-1]
+    return Walk(
+        t,
+        states.pose,
+        states.twist,
+        states.work,
+        states.loss,
+        strides.robots.energy(states, k),
+        speed=float(speed),
+        status=str(from_rest.status[k]),
+        cycles=0.0,
+        periodic=False,
+        drift=0.0,
+        limit=None,
+        unsolved=int(from_rest.state.unsolved[k]),
+        residual=float(from_rest.state.residual[k]),
     )
 
 
-def _at_limits(
+def _settling_time(
+    strides: Strides, from_rest: WalksFromRest, k: int, walk: Walk
+) -> float:
+    """Return `Walk.settling_time` of robot k, from the ends of its strides from
+    rest."""
+    cycle = 1.0 / strides.frequency[k]
+    x = [block[-1, 1] for block in from_rest.blocks[k]]
+    if from_rest.status[k] == "":
+        # The strides do not repeat themselves yet: the slopes at the limit predict
+        # further ones.
+        moves = predicted_progress(
+            strides,
+            walk.limit,
+            from_rest.state.take([k]),
+            k,
+            walk.speed * cycle / strides.cycle,
+        )
+        x = np.append(x, x[-1] + moves.cumsum())
+    moves = np.diff(x[:: strides.cycle])
+    return float(cycles_to_settle(moves, walk.speed * cycle) * cycle)
+
+
+def _fields_at_limits(
     walkers: Sequence[Walker],
     numerics: Fineness,
     limits: list[Limit],
     advance: Callable,
 ) -> list[dict]:
-    """Return the fields of `Walk` that belong to the limit cycles, from states near them."""
+    """Return the fields of `Walk` that belong to the limit cycles, from states near
+    them."""
     strides = _strides(walkers, numerics, advance)
     cycles = limit_cycles(strides, limits)
     return [_limit_fields(strides, cycles, k) for k in range(len(limits))]
@@ -226,33 +234,39 @@ def _at_limits(
 
 def _limit_fields(strides: Strides, cycles: LimitCycles, k: int) -> dict:
     """Return the fields of `Walk` that belong to the limit cycle of robot k."""
-    per_second, limit = strides.frequency[k] / strides.period, cycles.limits[k]
-    stuck = abs(cycles.progress[k]) < STUCK * strides.period * strides.reach[k]
+    strides_per_second = strides.frequency[k] / strides.period
+    limit = cycles.limits[k]
+    status = str(cycles.ends[k])
+    if not status:
+        least = STUCK * strides.period * strides.reach[k]
+        is_stuck = abs(cycles.progress[k]) < least
+        status = "stuck" if is_stuck else "walking"
     return {
-        "speed": float(cycles.progress[k] * per_second),
-        "status": str(cycles.ends[k]) or ("stuck" if stuck else "walking"),
+        "speed": float(cycles.progress[k] * strides_per_second),
+        "status": status,
         "cycles": float(cycles.strides[k] * strides.period),
         "periodic": bool(cycles.periodic[k]),
-        "drift": float(cycles.drift[k] * per_second),
+        "drift": float(cycles.drift[k] * strides_per_second),
         "limit": limit,
         "unsolved": int(limit.state.unsolved[0]),
         "residual": float(limit.state.residual[0]),
-        "unsolved_error": float(cycles.unsolved_error[k] * per_second),
+        "unsolved_error": float(cycles.unsolved_error[k] * strides_per_second),
     }
 
 
-def _rows(blocks, cycle: int, duration: float) -> np.ndarray:
-    """Return rows (T, 9) of t, pose, twist, work and loss until the duration, s, is over; the last ``cycle`` strides, if not
-    0, are repeated until then."""
+def _rows_until(blocks, repeated: int, duration: float) -> np.ndarray:
+    """Return rows (T, 9) of t, pose, twist, work and loss until a duration, s; the last
+    strides, ``repeated`` of them, are repeated until then."""
     rows = np.concatenate(blocks)
-    if cycle:
-        last, before = np.concatenate(blocks[-cycle:]), blocks[-1 - cycle][-1]
+    if repeated:
+        last = np.concatenate(blocks[-repeated:])
+        before = blocks[-1 - repeated][-1]
+        # Of time, x, work and loss; the others are the same in every cycle.
         gain = np.zeros(9)
         gain[[0, 1, 7, 8]] = (last[-1] - before)[[0, 1, 7, 8]]
         repetitions = int(np.ceil((duration - rows[-1, 0]) / gain[0]))
-        rows = np.concatenate(
-            [rows, *(last + k * gain for k in range(1, repetitions + 1))]
-        )
+        copies = [last + k * gain for k in range(1, repetitions + 1)]
+        rows = np.concatenate([rows, *copies])
     return rows[rows[:, 0] <= duration + 1e-9]
 
 
@@ -263,21 +277,22 @@ def rerun(
     cycles: int | None = None,
     advance: Callable = compute_stride,
 ) -> list[Walk]:
-    """Return walks with other numerics; see `rft.terradynamics.walking.engines.Engine.rerun`."""
+    """Return walks with other numerics; see
+    `rft.terradynamics.walking.engines.Engine.rerun`."""
     others: list = [None] * len(walkers)
     ended = [k for k, w in enumerate(walks) if w.limit is None]
-    for k, one in zip(
-        ended, walk([walkers[k] for k in ended], numerics, cycles, advance=advance)
-    ):
+    ended_walkers = [walkers[k] for k in ended]
+    new_walks = walk(ended_walkers, numerics, cycles, advance=advance)
+    for k, one in zip(ended, new_walks):
         others[k] = one
-    rest = [k for k, w in enumerate(walks) if w.limit is not None]
-    for batch in _batches([walkers[k] for k in rest], numerics):
-        members = [rest[m] for m in batch]
+
+    with_limit = [k for k, w in enumerate(walks) if w.limit is not None]
+    for batch in _batches([walkers[k] for k in with_limit], numerics):
+        members = [with_limit[m] for m in batch]
+        batch_walkers = [walkers[k] for k in members]
         limits = [walks[k].limit for k in members]
-        for k, fields in zip(
-            members,
-            _at_limits([walkers[k] for k in members], numerics, limits, advance),
-        ):
+        new_fields = _fields_at_limits(batch_walkers, numerics, limits, advance)
+        for k, fields in zip(members, new_fields):
             others[k] = walks[k]._replace(**fields)
     return others
 
@@ -285,34 +300,30 @@ def rerun(
 def step_cost(
     walkers: Sequence[Walker], numerics: Fineness, seconds: float
 ) -> tuple[float, float]:
-    """Return the cost of a time step; see `rft.terradynamics.walking.engines.Engine.step_cost`."""
-    strides, robots = _strides(walkers, numerics), np.arange(len(walkers))
-    ends, state, done, tries = (
-        (strides.top, strides.out_of_reach),
-        strides.robots.start(),
-        0,
-        0,
-    )
+    """Return the cost of a time step; see
+    `rft.terradynamics.walking.engines.Engine.step_cost`."""
+    strides = _strides(walkers, numerics)
+    robots = np.arange(len(walkers))
+    end_heights = (strides.top, strides.airborne_height)
+    state = strides.robots.start()
 
-    def steps(begin, count):
-        phases, rate_phases = (
-            strides.phases[begin : begin + count + 1],
-            strides.rate_phases[begin : begin + count],
-        )
-        return march(strides.robots, robots, state, phases, rate_phases, ends)
+    def compute_steps(first, count):
+        phases = strides.phases[first : first + count + 1]
+        rate_phases = strides.rate_phases[first : first + count]
+        return march(strides.robots, robots, state, phases, rate_phases, end_heights)
 
-    steps(0, 1)  # compiled code is loaded
+    compute_steps(0, 1)  # loads compiled code
     begin = time.process_time()
-    while done < len(strides.rate_phases):
-        states, evaluations = steps(done, max(1, done))  # one by one they take longer
-        state, tries, done = (
-            states.take(-1),
-            tries + int(evaluations[0]),
-            done + len(states.pose),
-        )
-        if (
-            time.process_time() - begin >= seconds
-            or strides.end_status(state, robots)[0]
-        ):
+    n_steps = 0
+    evaluations = 0
+    while n_steps < len(strides.rate_phases):
+        # Twice as many each time: one by one they take longer.
+        states, new_evaluations = compute_steps(n_steps, max(1, n_steps))
+        state = states.take(-1)
+        evaluations += int(new_evaluations[0])
+        n_steps += len(states.pose)
+        has_ended = strides.end_status(state, robots)[0]
+        if has_ended or time.process_time() - begin >= seconds:
             break
-    return (time.process_time() - begin) / done, tries / done
+    elapsed = time.process_time() - begin
+    return elapsed / n_steps, evaluations / n_steps

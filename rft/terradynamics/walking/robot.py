@@ -1,4 +1,5 @@
-"""Robots of the vertical plane: a rigid body on legs, and the clock by which the legs rotate.
+"""Robots of the vertical plane: a rigid body on legs, and the clock by which the legs
+rotate.
 
 Signs are those of `rft.terradynamics.plates.loads`: x forwards, z up, angles and rates
 about the y axis that points away, so a positive pitch has the nose down, and a leg that
@@ -22,11 +23,13 @@ from rft.terradynamics.plates.outline import Outline
 from rft.terradynamics.plates.shapes import Polygon, Shape
 
 MOST_HIPS = 20
-SHORTEST = (
-    1 / 8
-)  # of a cycle: shorter parts get as many time steps, since all of the motion may lie in them
-SMALLEST = 1e-7  # m/s, least rounding
-CREEP = 0.05  # largest rounding over the speed of the legs' ends: with more, slow legs sink as they stand
+# Shorter parts of a cycle get as many time steps as this share of it, since all of the
+# motion may lie in them.
+SHORTEST_INTERVAL = 1 / 8
+SMALLEST_ROUNDING = 1e-7  # m/s
+# Largest rounding over the speed of the legs' ends: with more, slow legs sink as they
+# stand.
+LARGEST_ROUNDING_SHARE = 0.05
 
 Mass = Annotated[float, Number(1e-6, 1e4, "kg", "mass of all that moves")]
 Axle = Annotated[
@@ -40,17 +43,19 @@ Axle = Annotated[
 
 @dataclass(frozen=True)
 class Tripod:
-    """The clock of a leg (RHex): for a share ``duty`` of the cycle it rotates by ``sweep``, with the angle ``middle`` in the
-    middle of that time, for the rest by 2 pi - sweep. Angle 0 is straight down from the body. Both rates are constant; by
-    default they are equal.
+    """The clock of a leg (RHex).
 
-    The legs at a hip differ by half a cycle.
+    For a share ``duty`` of the cycle a leg rotates by ``sweep``, with the angle
+    ``middle`` in the middle of that time, for the rest of the cycle by 2 pi - sweep.
+    Angle 0 is straight down from the body. Both rates are constant; by default they
+    are equal. The legs at a hip differ by half a cycle.
 
     Examples
     --------
     >>> from rft.terradynamics.walking import Tripod
     >>> gait = Tripod(frequency=2.0, duty=0.5, sweep=1.0)
-    >>> round(float(gait.angle(0.25, 0.25)), 3)  # rad, a quarter of a cycle after the middle of its stance
+    >>> # rad, a quarter of a cycle after the middle of its stance
+    >>> round(float(gait.angle(0.25, 0.25)), 3)
     0.5
     """
 
@@ -77,74 +82,74 @@ class Tripod:
 
     @property
     def kinks(self) -> tuple[float, ...]:
-        """Phases from 0 to 0.5 at which a leg of either tripod changes its rate, with 0 and 0.5."""
+        """Phases from 0 to 0.5 at which a leg of either tripod changes its rate, with 0
+        and 0.5."""
         if abs(self.sweep - 2 * math.pi * self.duty) < 1e-12:
             return 0.0, 0.5
         first = min(self.duty, 1.0 - self.duty) / 2
-        return (
-            (0.0, first, 0.5)
-            if abs(first - 0.25) < 1e-12
-            else (0.0, first, 0.5 - first, 0.5)
-        )
+        if abs(first - 0.25) < 1e-12:
+            return 0.0, first, 0.5
+        return 0.0, first, 0.5 - first, 0.5
 
     def angle(self, phase, rate_phase) -> np.ndarray:
-        """Return the angle of a leg at ``phase``, cycles, by the rate at ``rate_phase``, which tells the side of a kink."""
+        """Return the angle of a leg at ``phase``, cycles, by the rate at
+        ``rate_phase``, which determines the side of a kink."""
         return leg_angle(phase, rate_phase, self.duty, self.sweep, self.middle)
 
     def rate(self, phase) -> np.ndarray:
-        """Return the rate of a leg at ``phase``, rad a cycle."""
+        """Return the rate of a leg at ``phase``, rad per cycle."""
         return leg_rate(phase, self.duty, self.sweep)
 
 
 def intervals(kinks: Sequence[float], steps: int) -> list[tuple[float, float, int]]:
-    """Return (begin, end, number of time steps) between neighbouring kinks of a clock: about ``steps`` to a cycle, and in each
-    interval at least those of `SHORTEST`, so that half of the steps are half of them in every interval."""
-    return [
-        (a, b, max(1, round(steps * max(b - a, SHORTEST)))) for a, b in pairwise(kinks)
-    ]
+    """Return (begin, end, number of time steps) between neighbouring kinks of a clock:
+    about ``steps`` per cycle.
+
+    Each interval has at least the steps of `SHORTEST_INTERVAL`, so that half of
+    ``steps`` are half of the steps in every interval."""
+    out = []
+    for begin, end in pairwise(kinks):
+        length = max(end - begin, SHORTEST_INTERVAL)
+        out.append((begin, end, max(1, round(steps * length))))
+    return out
 
 
 def leg_angle(phase, rate_phase, duty, sweep, middle) -> np.ndarray:
     """Return `Tripod.angle` of many clocks."""
     turns = np.floor(np.asarray(rate_phase) + 0.5)
-    phase, within = (
-        np.asarray(phase) - turns,
-        np.asarray(rate_phase) - turns,
-    )  # the second from -0.5 to 0.5
+    phase = np.asarray(phase) - turns
+    rate_phase = np.asarray(rate_phase) - turns  # from -0.5 to 0.5
     stance = sweep / duty * phase
-    recovery = np.sign(within) * math.pi + _recovery_rate(duty, sweep) * (
-        phase - np.sign(within) * 0.5
-    )
-    return (
-        middle
-        + 2 * math.pi * turns
-        + np.where(np.abs(within) <= duty / 2, stance, recovery)
-    )
+    side = np.sign(rate_phase)
+    recovery = side * math.pi + _recovery_rate(duty, sweep) * (phase - side * 0.5)
+    stands = np.abs(rate_phase) <= duty / 2
+    return middle + 2 * math.pi * turns + np.where(stands, stance, recovery)
 
 
 def leg_rate(phase, duty, sweep) -> np.ndarray:
     """Return `Tripod.rate` of many clocks."""
-    within = np.asarray(phase) - np.floor(np.asarray(phase) + 0.5)
-    return np.where(
-        np.abs(within) <= duty / 2, sweep / duty, _recovery_rate(duty, sweep)
-    )
+    phase = np.asarray(phase) - np.floor(np.asarray(phase) + 0.5)
+    stands = np.abs(phase) <= duty / 2
+    return np.where(stands, sweep / duty, _recovery_rate(duty, sweep))
 
 
 def _recovery_rate(duty, sweep):
-    """Return the rate of a leg that recovers, rad a cycle."""
+    """Return the rate of a leg that recovers, rad per cycle."""
     return (2 * math.pi - sweep) / (1.0 - duty)
 
 
 def walking_rounding(rounding: float, frequency, reach):
-    """Return the rounding, m/s, for legs of a reach, m, at a frequency, Hz: less than ``rounding`` for slow legs."""
-    return np.clip(
-        CREEP * 2 * math.pi * np.asarray(frequency) * reach, SMALLEST, rounding
-    )
+    """Return the rounding, m/s, for legs of a reach, m, at a frequency, Hz: less than
+    ``rounding`` for slow legs."""
+    largest = LARGEST_ROUNDING_SHARE * 2 * math.pi * np.asarray(frequency) * reach
+    return np.clip(largest, SMALLEST_ROUNDING, rounding)
 
 
 class Robot:
-    """Base of robots. legs: shape of every leg, which rotates about its axle at a hip. inertia: kg m^2, infinite for a robot
-    that keeps its pitch.
+    """Base of robots.
+
+    legs: shape of every leg, which rotates about its axle at a hip. inertia: kg m^2,
+    infinite for a robot that keeps its pitch.
 
     Examples
     --------
@@ -157,9 +162,8 @@ class Robot:
     mass: float
     legs: Shape
     axle: float
-    part: ClassVar[str] = (
-        "legs"  # field, and table of a scene, of the parts that drive the robot
-    )
+    # Field, and table of a scene, of the parts that drive the robot.
+    part: ClassVar[str] = "legs"
     parts: ClassVar[str] = "legs"  # name of these parts in messages
     hip_phases: ClassVar[tuple[float, ...]]  # phases of the legs at a hip, cycles
     period: ClassVar[float]  # cycles after which the robot looks the same
@@ -167,20 +171,18 @@ class Robot:
     def leg(self, elements: int) -> Outline:
         """Return the outline of a leg about its hip."""
         outline = self.legs.outline(elements)
-        return (
-            Outline(
-                outline.points - [0.0, self.axle], outline.width, outline.smooth_normals
-            )
-            if self.axle
-            else outline
-        )
+        if not self.axle:
+            return outline
+        points = outline.points - [0.0, self.axle]
+        return Outline(points, outline.width, outline.smooth_normals)
 
     def belly(self, elements: int) -> Outline | None:
         """Return the outline of the body; None if it cannot touch the ground."""
         return None
 
     def check(self, elements: int) -> None:
-        """Raise ValueError unless the robot's surfaces can have ``elements`` elements."""
+        """Raise ValueError unless the robot's surfaces can have ``elements``
+        elements."""
         self.leg(elements)
 
     def _check(self) -> None:
@@ -195,13 +197,15 @@ class Robot:
 
 @dataclass(frozen=True)
 class Rhex(Robot):
-    """A box on two legs at each hip, which differ by half a cycle and alternate from hip to hip: an alternating tripod.
+    """A box on two legs at each hip, which differ by half a cycle and alternate from
+    hip to hip: an alternating tripod.
 
     hips (m): x of each hip from the centre of mass.
 
-    aside (m): distance of the legs at each hip from the middle plane, one on either side, for the engine of three
-    dimensions. By default legs touch the box; of an odd number of hips every second one has its legs farther out, so that a
-    tripod with equal forces on its legs neither rolls nor yaws the body.
+    aside (m): distance of the legs at each hip from the middle plane, one on either
+    side, for the engine of three dimensions. By default legs touch the box; of an odd
+    number of hips every second one has its legs farther out, so that a tripod with
+    equal forces on its legs neither rolls nor yaws the body.
 
     Examples
     --------
@@ -237,6 +241,16 @@ class Rhex(Robot):
 
     def __post_init__(self):
         self._check()
+        object.__setattr__(self, "hips", self._checked_hips())
+        if self.inertia is None:
+            inertia = self.mass * (self.length**2 + self.height**2) / 12
+            object.__setattr__(self, "inertia", inertia)
+            check_numbers(self)
+        if self.aside is not None:
+            object.__setattr__(self, "aside", self._checked_aside())
+
+    def _checked_hips(self) -> tuple[float, ...]:
+        """Return the hips as numbers; ValueError unless they are some, on the body."""
         hips = real_array("hips", self.hips)
         require(hips.ndim == 1, "hips must be a list of x in m", value=self.hips)
         require(
@@ -244,53 +258,59 @@ class Rhex(Robot):
             "a robot without legs",
             because=f"hips must be 1 to {MOST_HIPS} numbers, got {len(hips)}",
         )
-        within = bool((np.abs(hips) <= self.length).all())
         require(
-            within,
-            f"hips must be within a body length, {self.length:g} m, of the centre of mass (in m)",
+            bool((np.abs(hips) <= self.length).all()),
+            f"hips must be within a body length, {self.length:g} m, of the centre of "
+            "mass (in m)",
         )
-        object.__setattr__(self, "hips", tuple(map(float, hips)))
-        if self.inertia is None:
-            object.__setattr__(
-                self, "inertia", self.mass * (self.length**2 + self.height**2) / 12
-            )
-            check_numbers(self)
-        if self.aside is not None:
-            aside = real_array("aside", self.aside)
-            valid = aside.shape == hips.shape and bool(
-                ((aside >= 0) & (aside <= LARGEST)).all()
-            )
-            message = f"aside must be {len(hips)} numbers from 0 to {LARGEST:g} m, one for each hip"
-            require(valid, message, value=self.aside)
-            object.__setattr__(self, "aside", tuple(map(float, aside)))
+        return tuple(map(float, hips))
+
+    def _checked_aside(self) -> tuple[float, ...]:
+        """Return the distances ``aside`` as numbers; ValueError unless each hip has
+        one."""
+        count = len(self.hips)
+        aside = real_array("aside", self.aside)
+        is_within = bool(((aside >= 0) & (aside <= LARGEST)).all())
+        require(
+            aside.shape == (count,) and is_within,
+            f"aside must be {count} numbers from 0 to {LARGEST:g} m, one for each hip",
+            value=self.aside,
+        )
+        return tuple(map(float, aside))
 
     @property
     def sides(self) -> np.ndarray:
         """Distances (K,), m, of the legs at each hip from the middle plane."""
         if self.aside is not None:
             return np.array(self.aside)
-        count, near = len(self.hips), (self.width + self.legs.width) / 2
-        out = (count + 1) / (count - 1) if count > 1 and count % 2 else 1.0
-        return np.array([near * (out if k % 2 else 1.0) for k in range(count)])
+        count = len(self.hips)
+        near = (self.width + self.legs.width) / 2
+        far = near
+        if count > 1 and count % 2:
+            # The fewer legs of one tripod are farther out, so that both have the same
+            # moment about the middle plane.
+            far = near * ((count + 1) / (count - 1))
+        return np.where(np.arange(count) % 2, far, near)
 
     def belly(self, elements: int) -> Outline:
-        x, z = self.length / 2, self.height / 2
-        return Polygon(((-x, -z), (x, -z), (x, z), (-x, z)), self.width).outline(
-            elements
-        )
+        x = self.length / 2
+        z = self.height / 2
+        box = Polygon(((-x, -z), (x, -z), (x, z), (-x, z)), self.width)
+        return box.outline(elements)
 
 
 @dataclass(frozen=True)
 class Roller(Robot):
-    """A wheel, or another rotating shape, on an axle kept level: a mass that moves forwards and up and down under its own
-    weight.
+    """A wheel, or another rotating shape, on an axle kept level: a mass that moves
+    forwards and up and down under its own weight.
 
     Examples
     --------
     >>> from rft.terradynamics.plates import StressMap, Wheel
     >>> from rft.terradynamics.walking import Fineness, Roller, Tripod, Walker, engine
     >>> wheel = Roller(mass=1.0, legs=Wheel(radius=0.05, width=0.03))
-    >>> (walk,) = engine("planar").walk([Walker(wheel, Tripod(frequency=0.5), StressMap())], Fineness(steps=16))
+    >>> walker = Walker(wheel, Tripod(frequency=0.5), StressMap())
+    >>> (walk,) = engine("planar").walk([walker], Fineness(steps=16))
     >>> walk.status
     'walking'
     """
