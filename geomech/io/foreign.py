@@ -1,4 +1,5 @@
-"""Files of other programs that are no tables of text: what they are, and what to export."""
+"""Files of other programs that are no tables of text: their kinds, and what to export
+instead."""
 
 from __future__ import annotations
 
@@ -51,28 +52,30 @@ def refuse_program(path: str | Path) -> None:
 
 
 def refuse_foreign(path: str | Path, raw: bytes) -> None:
-    """Raise Refusal for the bytes of a file that is known, and no table of text."""
+    """Raise Refusal for a file of a kind that is known, and that is no table of text.
+    raw: its bytes."""
     refuse_program(path)
-    what, cure = "", ""
-    for start, name, remedy in SIGNATURES:
+    kind, cure = _kind_and_cure(path, raw)
+    if kind:
+        raise Refusal(f"it is {kind}", where=Path(path).name, instead=cure)
+
+
+def _kind_and_cure(path: str | Path, raw: bytes) -> tuple[str, str]:
+    """Return the kind of a file, and the cure; "" for both if it may be a table."""
+    for start, kind, cure in SIGNATURES:
         if raw.startswith(start):
-            what, cure = name, remedy
-            break
-    if not what and raw.lstrip()[:1] in (b"{", b"["):
-        what, cure = _json(path, raw)
-    if what:
-        raise Refusal(f"it is {what}", where=Path(path).name, instead=cure)
-
-
-def _json(path: str | Path, raw: bytes) -> tuple[str, str]:
-    """Return what a file of JSON is, and the cure; "" for both if it is none."""
+            return kind, cure
+    if raw.lstrip()[:1] not in (b"{", b"["):
+        return "", ""
     try:
         content = json.loads(raw)
     except (ValueError, RecursionError):
         return "", ""
     if isinstance(content, dict) and {"units", "data"} <= {*content}:
-        each = "write a row t,point,x,y for each point of t, x, y in its data"
-        return "a WCON file (JSON)", each
+        return (
+            "a WCON file (JSON)",
+            "write a row t,point,x,y for each point of t, x, y in its data",
+        )
     if Path(path).suffix.lower() == ".wcon":
         return "a WCON file (JSON)", "write its points as rows t,point,x,y"
     return "JSON", "write its values as a CSV file, a row for each time"
