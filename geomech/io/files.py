@@ -72,8 +72,8 @@ def reason_of(error: Exception) -> str:
 
 
 def hidden(path: Path, ending: str) -> Path:
-    """Return the path of a hidden file beside ``path``, which depends on it alone; it is
-    short where the file system would refuse a long name."""
+    """Return the path of a hidden file beside ``path``, which depends on it alone; it
+    is short where the file system would refuse a long name."""
     name = f".{path.name}{ending}"
     if len(os.fsencode(name)) + NAME_MARGIN > _longest_name(path.parent):
         name = f".geomech-{_digest(Path(path.name))}{ending}"
@@ -200,7 +200,8 @@ class _StagingFolder:
     removed at the end.
 
     Its owner holds a lock on a mark in it. A kill leaves the folder and frees the lock;
-    the next writer to the same target recognises a stray folder by that, and removes it.
+    the next writer to the same target recognises a stray folder by that, and removes
+    it.
     The name is chosen before the folder exists, so that it is also removed after a
     signal at any moment. refusal: returns the exception for an error of the file system
     at the start.

@@ -15,6 +15,7 @@ TRACKS = (
 SPREADSHEET = "save the sheet as CSV"
 BAG = "export its topic as CSV, for example by rostopic echo -p"
 MATLAB = "write its columns as CSV by writematrix or writetable"
+NUMPY = "write it by numpy.savetxt, with header and comments=''"
 TEXT = "write its columns as CSV, for example by pandas.DataFrame.to_csv"
 SIGNATURES = (  # the first bytes of a file, what it is, and the cure
     (b"\x89HDF\r\n\x1a\n", "an HDF5 file", TRACKS),
@@ -24,7 +25,7 @@ SIGNATURES = (  # the first bytes of a file, what it is, and the cure
     (b"#ROSBAG", "a ROS bag", BAG),
     (b"\x89MCAP", "a ROS bag (MCAP)", BAG),
     (b"SQLite format 3\x00", "a database, as of ROS 2 bags", BAG),
-    (b"\x93NUMPY", "a NumPy array", "write it by numpy.savetxt, with header and comments=''"),
+    (b"\x93NUMPY", "a NumPy array", NUMPY),
     (b"PAR1", "a Parquet file", TEXT),
     (b"\x1f\x8b", "a gzip file", "unpack it"),
 )  # fmt: skip

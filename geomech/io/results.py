@@ -1,8 +1,8 @@
-"""Results as files and as plain data: NetCDF (classic format, which every NetCDF library
-opens), JSON, CSV, MAT, and data sets of xarray.
+"""Results as files and as plain data: NetCDF (classic format, which every NetCDF
+library opens), JSON, CSV, MAT, and data sets of xarray.
 
-All have the names of the variables; errors and spreads are NAME_error and NAME_spread in
-all of them. `geomech.results.files` knows which kind has which of these formats.
+All have the names of the variables; errors and spreads are NAME_error and NAME_spread
+in all of them. `geomech.results.files` knows which kind has which of these formats.
 """
 
 from __future__ import annotations
@@ -74,8 +74,8 @@ def join_companions(
 
 
 def companion_owner(name: str, by_name: dict[str, Variable]) -> str | None:
-    """Return the name of the variable, over the same dimensions, of which this one is the
-    error or the spread."""
+    """Return the name of the variable, over the same dimensions, of which this one is
+    the error or the spread."""
     for ending in ENDINGS:
         owner = by_name.get(name.removesuffix(ending))
         companion = by_name.get(name)
@@ -213,7 +213,8 @@ def write_netcdf(path: str | Path, result: Result) -> None:
 
 
 def write_variable(file: Any, variable: Variable) -> None:
-    """Write a variable of an open NetCDF file; text is an array of bytes over one dimension more."""
+    """Write a variable of an open NetCDF file. Text becomes an array of bytes with one
+    more dimension."""
     dims = variable.dims
     values = variable.values
     code = "f8"

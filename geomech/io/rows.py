@@ -1,4 +1,5 @@
-"""Tables of numbers in text files, as instruments, trackers and spreadsheets write them.
+"""Tables of numbers in text files, as instruments, trackers and spreadsheets write
+them.
 
 All commands use this reader. It works in six steps:
 
@@ -210,8 +211,8 @@ class Rows:
 
     @property
     def header_text(self) -> str:
-        """The words of the header, for a Refusal. "" for a file without rows of numbers:
-        it may be any file, whose first line no message should show."""
+        """The words of the header, for a Refusal. "" for a file without rows of
+        numbers: it may be any file, whose first line no message should show."""
         if all(self.number(x) is None for x in self.first_cells()):
             return ""
         return f"it has {formatted(', '.join(self.words), 200)}"
@@ -737,8 +738,8 @@ def _decimal_mark(rows: list[tuple[int, str]], separator: str, name: str) -> str
     """Return the decimal mark, "." or ",".
 
     It is a comma where a number has one, and the comma is no separator or stands in
-    quotes. Refusal where all such numbers may have groups of thousands, as 1,234, unless
-    the separator is a semicolon."""
+    quotes. Refusal where all such numbers may have groups of thousands, as 1,234,
+    unless the separator is a semicolon."""
     thousands = None
     for line, text in rows:
         if "," not in text or (separator == "," and '"' not in text):

@@ -1,5 +1,5 @@
-"""Scenes: what is simulated, and how finely. `load` reads one by its name or from a TOML
-file, `toml` returns its text."""
+"""Scenes: what is simulated, and how finely. `load` reads one by its name or from a
+TOML file, `toml` returns its text."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING

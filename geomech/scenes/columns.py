@@ -38,9 +38,9 @@ def column(name: str) -> Column:
 def columns(
     place: str, path, required: tuple[str, ...], optional: tuple[str, ...] = ()
 ) -> dict[str, np.ndarray]:
-    """Return the columns ``required`` (N,), and those of ``optional`` that the file has,
-    by name, in the units of `KINDS`. Refusal, with ``place`` and the line, for any other
-    file."""
+    """Return the columns ``required`` (N,), and those of ``optional`` that the file
+    has, by name, in the units of `KINDS`. Refusal, with ``place`` and the line, for any
+    other file."""
     if not isinstance(path, (str, Path)):
         raise Refusal("file must be the name of a CSV file", value=path, where=place)
     header = ",".join(required)
@@ -68,7 +68,7 @@ def columns(
 def columns_reader(
     required: tuple[str, ...], optional: tuple[str, ...] = ()
 ) -> Callable[[str, str], dict[str, list]]:
-    """Return a function (place, file) that reads a column of a CSV file for each key."""
+    """Return a function (place, file) that reads a CSV file with a column per key."""
 
     def read(place: str, file: str) -> dict[str, list]:
         values = columns(place, file, required, optional)

@@ -83,9 +83,9 @@ def read(path: str | Path) -> Measured:
 
     Columns, in any order: psi_deg, F_parallel_N, F_perpendicular_N. Optional ones:
     weight (of the squares, 1 if left out), and end_parallel_N and end_perpendicular_N
-    (on both ends, where the others are on a flank as long as the rod). Other columns are
-    ignored. Lines that begin with # may give the rod's diameter or radius, length and
-    depth, and the grains' density and packing, in words as in the sample or as
+    (on both ends, where the others are on a flank as long as the rod). Other columns
+    are ignored. Lines that begin with # may give the rod's diameter or radius, length
+    and depth, and the grains' density and packing, in words as in the sample or as
     ``radius = 8 mm``.
     """
     if str(path) in SAMPLES:

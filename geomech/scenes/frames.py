@@ -35,8 +35,8 @@ def framed(system: System, numerics: Numerics) -> System:
 
 
 def reframed(system: System, numerics: Numerics) -> System:
-    """Return a system whose frame depends on numerics with the frame of these; any other
-    system unchanged."""
+    """Return a system whose frame depends on numerics with the frame of these; any
+    other system unchanged."""
     if isinstance(system, Framed):
         return framed(system, numerics)
     return system

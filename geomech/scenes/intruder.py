@@ -35,8 +35,8 @@ POINTS = FromFile(
 )
 COURSE = FromFile(
     columns_reader(("t", "x", "z"), ("angle",)),
-    "CSV with the header t,x,z or t,x,z,angle (s, m, rad); velocities are differences of "
-    "order 2 in the spacing of t",
+    "CSV with the header t,x,z or t,x,z,angle (s, m, rad); velocities are differences "
+    "of order 2 in the spacing of t",
 )
 ELEMENTS = (
     "of the outline, about, 1 to 5000; the error is of order 2 in their number, 1 with "
@@ -162,8 +162,8 @@ class IntruderScene(Intruding):
         )
 
     def table(self, result: Intrusion) -> dict[str, np.ndarray]:
-        """Return the columns of a result: t; angle, or x and z if the body does not turn
-        about a hub; force_x, force_z, moment."""
+        """Return the columns of a result: t; angle, or x and z if the body does not
+        turn about a hub; force_x, force_z, moment."""
         columns = {"t": result.t}
         if self.motion.turns:
             columns["angle"] = result.pose[:, 2]

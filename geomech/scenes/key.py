@@ -1,9 +1,10 @@
 """Keys of a section of a scene file, from the class that the section is read into.
 
-A class declares them in the annotations of its fields (`rft.core.checks.Number`, `Word`),
-else in its docstring, as ``name (unit): meaning`` or ``name, other (unit): meaning``, up
-to the next key or the end of the paragraph. The unit is - where there is none. A key in
-rad may be given in degrees, as ``name_deg``. Types and defaults are those of the fields.
+A class declares them in the annotations of its fields (`rft.core.checks.Number`,
+`Word`), else in its docstring, as ``name (unit): meaning`` or ``name, other (unit):
+meaning``, up to the next key or the end of the paragraph. The unit is - where there is
+none. A key in rad may be given in degrees, as ``name_deg``. Types and defaults are
+those of the fields.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ MARK = re.compile(r"(?<![\w`.])((?:[A-Za-z_]\w*, )*[A-Za-z_]\w*) \(([^()]*)\):\s
 
 
 class Word(NamedTuple):
-    """The annotation of a field whose text is one of several choices. meaning: for lists
-    of keys."""
+    """The annotation of a field whose text is one of several choices. meaning: for
+    lists of keys."""
 
     choices: Collection[str]
     meaning: str
@@ -158,8 +159,8 @@ def words_of(kind: type) -> dict[str, Word]:
 
 
 def _schemas(kind: type) -> dict[str, dict]:
-    """Return JSON Schema of the fields by name. A type that no scene file can hold is an
-    object; {} for a custom class of which there is no schema."""
+    """Return JSON Schema of the fields by name. A type that no scene file can hold is
+    an object; {} for a custom class of which there is no schema."""
     try:
         schema = msgspec.json.schema(kind, schema_hook=lambda _: {"type": "object"})
         return schema["$defs"][kind.__name__]["properties"]

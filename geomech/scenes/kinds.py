@@ -1,10 +1,10 @@
-"""Custom parts in all registries: laws, bodies, gaits, effects, systems, tiers, drawings,
-file formats.
+"""Custom parts in all registries: laws, bodies, gaits, effects, systems, tiers,
+drawings, file formats.
 
 They are added by `register`; by a file that the user names (`--plugin FILE.py`,
-`load_file`); or by an installed package, whose entry point in the group of a registry is
-loaded when its name is first used (`geomech.core.entry_points`). A scene file never runs
-code by itself.
+`load_file`); or by an installed package, whose entry point in the group of a registry
+is loaded when its name is first used (`geomech.core.entry_points`). A scene file never
+runs code by itself.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ _files: dict[str, str] = {}  # texts of custom files, by full name
 
 def register(part: Any = None, /, **members: Any) -> Any:
     """Register a custom part under its name in scenes, and return it. The name is its
-    ``law`` (a force law), ``name`` (a tier) or ``kind`` (all others). A part of the same
-    module and name is replaced. Also a decorator.
+    ``law`` (a force law), ``name`` (a tier) or ``kind`` (all others). A part of the
+    same module and name is replaced. Also a decorator.
 
     members: of a function. ``velocity(alpha, alphadot)`` is a system: it needs
     ``joints``, and ``kind``, ``length`` and ``traits`` if they are not its name, 1 and

@@ -24,12 +24,12 @@ HEADER = "amplitude,value,error"
 
 
 def read(path: str | Path, scene: Scene, angle: bool = False) -> dict[str, np.ndarray]:
-    """Return amplitude, value and error (N,) of measured displacements per cycle, in the
-    units of the scene's results.
+    """Return amplitude, value and error (N,) of measured displacements per cycle, in
+    the units of the scene's results.
 
-    The header has the columns amplitude and value, and optionally error, in any order. A
-    name may have another unit, as amplitude_deg, value_mm or error_BL. angle: values are
-    headings. Refusal, with the line, for any other file."""
+    The header has the columns amplitude and value, and optionally error, in any order.
+    A name may have another unit, as amplitude_deg, value_mm or error_BL. angle: values
+    are headings. Refusal, with the line, for any other file."""
     source = rows.read(path, LARGEST_FILE, f"give a CSV file with the header {HEADER}")
     length = body_size(scene.system)
     in_angles = "amplitude" in angles_of(type(scene.gait))
@@ -55,9 +55,9 @@ def read(path: str | Path, scene: Scene, angle: bool = False) -> dict[str, np.nd
 
 
 def converted(data: Mapping, units: dict[str, dict[str, float]]) -> dict:
-    """Return amplitude, value and error (N,) of measurements in a table. Its columns have
-    the names of those of a file; error may be missing, and others are ignored. Refusal
-    for other names."""
+    """Return amplitude, value and error (N,) of measurements in a table. Its columns
+    have the names of those of a file; error may be missing, and others are ignored.
+    Refusal for other names."""
     words = [x for x in data if str(x).lower().startswith(COLUMNS)]
     scales = _scales([str(x) for x in words], units, "data", "the table")
     columns = {}
@@ -69,9 +69,10 @@ def converted(data: Mapping, units: dict[str, dict[str, float]]) -> dict:
 def units_of(
     in_angles: bool, unit: str, length: float, angle: bool
 ) -> dict[str, dict[str, float]]:
-    """Return the units that each column may have, with their factors to the units of the
-    results, by column. in_angles: amplitudes are angles. unit: of lengths in results,
-    "BL" or "m". length: of the body in that unit. angle: values are headings."""
+    """Return the units that each column may have, with their factors to the units of
+    the results, by column. in_angles: amplitudes are angles. unit: of lengths in
+    results, "BL" or "m". length: of the body in that unit. angle: values are
+    headings."""
     amplitude = {"": 1.0}
     if in_angles:
         amplitude = ANGLES
@@ -86,8 +87,9 @@ def units_of(
 def _scales(
     words: Sequence[str], units: dict[str, dict[str, float]], place: str, owner: str
 ) -> dict[str, float]:
-    """Return the factor of each column from the unit in its name to that of the results,
-    by column; Refusal for other columns. owner: of the results, for a Refusal."""
+    """Return the factor of each column from the unit in its name to that of the
+    results, by column; Refusal for other columns. owner: of the results, for a
+    Refusal."""
     scales: dict[str, float] = {}
     for word in words:
         name, unit = split_unit(word)

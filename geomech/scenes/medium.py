@@ -102,8 +102,8 @@ def _cure_of_table(path: Path) -> str:
 
 
 def _drag_table(place: str, file: str) -> dict[str, list]:
-    """Return the columns of a CSV file by name: psi, rad, and f_t and f_n, or the forces
-    on a rod under these names."""
+    """Return the columns of a CSV file by name: psi, rad, and f_t and f_n, or the
+    forces on a rod under these names."""
     with located(place):
         source = read_rows(
             file, LARGEST_FILE, "give a CSV file with columns psi_deg,f_t,f_n"

@@ -114,8 +114,8 @@ class Scene(Displayed):
                 note_radius(self.system)
 
     def note_turns(self, gait: Gait, amplitudes: ArrayLike | None = None) -> None:
-        """Warn (`Note`) if a gait turns a joint by more than a full turn, or if its curve
-        is far from its points."""
+        """Warn (`Note`) if a gait turns a joint by more than a full turn, or if its
+        curve is far from its points."""
         if hasattr(gait, "largest"):
             note_angles(self.system, gait.largest(amplitudes))
         if hasattr(gait, "note"):
@@ -212,8 +212,8 @@ def checked_scene(scene: Any) -> Scene:
 
 
 def frequency_of(system: System, gait: Gait) -> float | None:
-    """Return the frequency, Hz, of a system that runs a gait: that of the gait, or of the
-    effects; None without either. Refusal if the two contradict each other."""
+    """Return the frequency, Hz, of a system that runs a gait: that of the gait, or of
+    the effects; None without either. Refusal if the two contradict each other."""
     gait_frequency = getattr(gait, "frequency", None)
     effect_frequency = system.traits.frequency
     if gait_frequency is None:

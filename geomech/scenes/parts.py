@@ -16,8 +16,8 @@ from geomech.systems.swimmer import Swimmer
 from rft.core.refusal import Refusal, formatted
 
 FORMS = (
-    "give the name of a scene, a TOML file, a Scene, (medium, body, gait), (system, gait), "
-    "or a function velocity(alpha, alphadot)"
+    "give the name of a scene, a TOML file, a Scene, (medium, body, gait), "
+    "(system, gait), or a function velocity(alpha, alphadot)"
 )
 MOST_JOINTS = 12  # of a system for which a wave is the default gait
 PART_WIDTH = 24  # letters that a refusal prints of each part
@@ -31,10 +31,10 @@ def as_scene(
 
     Parts are a medium and a body, or a system, or a function velocity(alpha, alphadot),
     and a gait, in any order; they may be in a tuple. A medium may be its name or its
-    file. Without a gait two joints run a circle of 1 rad, and other bodies of few joints
-    a wave of 0.5 rad. effects: of a medium and a body. joints: of a velocity without a
-    gait, 2 if left out. numerics: in place of the scene's [numerics]. Refusal for
-    anything else."""
+    file. Without a gait two joints run a circle of 1 rad, and other bodies of few
+    joints a wave of 0.5 rad. effects: of a medium and a body. joints: of a velocity
+    without a gait, 2 if left out. numerics: in place of the scene's [numerics]. Refusal
+    for anything else."""
     if len(parts) == 1 and isinstance(parts[0], tuple):
         parts = parts[0]
     scene = None

@@ -114,8 +114,8 @@ def _area(source: Rows) -> float | None:
 
 
 def _areas_in(text: str) -> set[float]:
-    """Return the areas that a line gives as such, m^2: "area 9.5 cm^2", "area_cm2 = 9.5",
-    or "area = 9.5e-4" without a unit."""
+    """Return the areas that a line gives as such, m^2: "area 9.5 cm^2", "area_cm2 =
+    9.5", or "area = 9.5e-4" without a unit."""
     matches = re.findall(r"\barea" + CONNECTIVE + NUMBER + r"\s*" + SQUARE, text)
     unit_first = r"\barea[ _]*[\(\[]?" + SQUARE + r"[\)\]]?\s*[=:]?\s*" + NUMBER
     for unit, number in re.findall(unit_first, text):
@@ -138,8 +138,8 @@ def _rectangles_in(text: str) -> set[float]:
 
 
 def _circles_in(text: str) -> set[float]:
-    """Return the areas of plates that a line gives by a diameter, m^2: "plate diameter 4
-    cm"."""
+    """Return the areas of plates that a line gives by a diameter, m^2: "plate diameter
+    4 cm"."""
     diameter = r"\bdiameter" + CONNECTIVE + NUMBER + r"\s*(um|mm|cm|m)\b"
     areas = set()
     for number, unit in re.findall(r"\bplate\b[^\d,;]*" + diameter, text):

@@ -1,4 +1,4 @@
-"""The reader of a scene's TOML file; scenes that ship with the toolkit are in builtin/."""
+"""The reader of a scene's TOML file. Built-in scenes are in builtin/."""
 
 from __future__ import annotations
 
@@ -86,8 +86,8 @@ def builtin_text(name: str) -> str | None:
 
 
 def load(scene: str | Path) -> Scene | Any:
-    """Return the built-in scene of a name, or the scene of a TOML file; Refusal if there
-    is none.
+    """Return the built-in scene of a name, or the scene of a TOML file; Refusal if
+    there is none.
 
     With an [intruder] it is an intruder scene, with a [robot] a `WalkerScene`. The type
     is Any, so that type checkers do not ask which.
@@ -129,8 +129,8 @@ def load(scene: str | Path) -> Scene | Any:
 
 
 def in_medium(scene: Scene, file: str | Path) -> Scene:
-    """Return the scene in the medium of a file, as for ``[medium] file``, or of a table of
-    drag if the file's name ends in .csv. Refusal if the file has no medium, or the
+    """Return the scene in the medium of a file, as for ``[medium] file``, or of a table
+    of drag if the file's name ends in .csv. Refusal if the file has no medium, or the
     scene's system takes none.
 
     Examples
@@ -181,8 +181,8 @@ def _medium_file(file: str | Path, place: str) -> tuple[Any, tuple[str, ...]]:
 
 
 def inputs(scene: Scene | Intruding | WalkerScene) -> list[Path]:
-    """Return the files from which a scene was read: its own, unless it is built in or came
-    from a pipe, and those of its parts.
+    """Return the files from which a scene was read: its own, unless it is built in or
+    came from a pipe, and those of its parts.
 
     Examples
     --------

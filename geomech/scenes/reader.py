@@ -54,8 +54,8 @@ class Source:
         return f"see 'geomech scenes --show {self.example}'"
 
     def located(self, table: Mapping) -> dict:
-        """Return a table in which the name of a file has its folder, and add the file to
-        ``files``."""
+        """Return a table in which the name of a file has its folder, and add the file
+        to ``files``."""
         table = dict(table)
         folder = self.folder or Path(self.name).absolute().parent
         for key in FILES:
@@ -80,7 +80,7 @@ def read(scene: type[Built], tables: Mapping, name: str, text: str) -> Built:
 
 
 def check(scene: type, tables: Mapping, source: Source) -> None:
-    """Raise Refusal for a table that a scene does not declare, and for a missing one."""
+    """Raise Refusal for a table that is not declared, or missing."""
     declared = file_sections(scene)
     for table in tables:
         choose(f"{source.name}: table", table, declared)
@@ -269,8 +269,8 @@ def _build_refusal(error: Exception, place: str, table: Mapping, kind: type) -> 
 
 
 def _field_values(place: str, table: Mapping, kind: type) -> dict[str, Any]:
-    """Return the values of a table by field, with angles in rad; Refusal for a field that
-    is given under two names."""
+    """Return the values of a table by field, with angles in rad; Refusal for a field
+    that is given under two names."""
     values: dict[str, Any] = {}
     for key, value in table.items():
         field, in_degrees = spellings(kind)[key]
@@ -288,8 +288,8 @@ def _field_values(place: str, table: Mapping, kind: type) -> dict[str, Any]:
 
 
 def _check_keys(place: str, table: Mapping, kind: type, label: str) -> None:
-    """Raise Refusal for a key that a class does not have. label: how the table names the
-    class."""
+    """Raise Refusal for a key that a class does not have. label: how the table names
+    the class."""
     try:
         for key in table:
             choose(f"{place} key", key, spellings(kind))
@@ -300,8 +300,8 @@ def _check_keys(place: str, table: Mapping, kind: type, label: str) -> None:
 
 
 def _check_degrees(place: str, value) -> None:
-    """Warn (`UnitWarning`) of an angle of grains below a degree: measured ones are ten to
-    twenty degrees."""
+    """Warn (`UnitWarning`) of an angle of grains below a degree: measured ones are ten
+    to twenty degrees."""
     if isinstance(value, (int, float)) and 0 < value < 1:
         text = (
             f"{place} = {value:g} is less than a degree: if that is in rad, write "

@@ -236,8 +236,8 @@ def _alternatives(alternatives: Alternatives, keys: dict[str, Key]) -> dict[str,
 
 
 def _shared(variant: Variant) -> set[str]:
-    """Return the keys of a kind that may be given in [physical]; `_sizes_needed` requires
-    them in one of both places."""
+    """Return the keys of a kind that may be given in [physical]; `_sizes_needed`
+    requires them in one of both places."""
     names = {*variant.named.values()}
     shared = set()
     for field in dataclasses.fields(Physical):

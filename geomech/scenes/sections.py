@@ -13,10 +13,10 @@ A scene is a dataclass whose fields declare their sections in annotations:
 
 `reader`, `write`, `keys` and `schema` follow these declarations. The keys of a section
 are the fields of a class, where their units, bounds and meanings stand
-(`geomech.scenes.key`). The class is that of the part, or only has its keys. In the second
-case it has a method ``to_part(source, place, given)`` that returns the part, or a dict of
-several fields of the scene (given: the fields in the file), and an attribute ``makes``,
-the class of parts that it can write.
+(`geomech.scenes.key`). The class is that of the part, or only has its keys. In the
+second case it has a method ``to_part(source, place, given)`` that returns the part, or
+a dict of several fields of the scene (given: the fields in the file), and an attribute
+``makes``, the class of parts that it can write.
 """
 
 from __future__ import annotations
@@ -144,10 +144,11 @@ class Variant(NamedTuple):
     def alternatives(self) -> Alternatives | None:
         """Groups of its keys of which one is given; None where there are none."""
         if self.file and self.file.keys:
-            keys = ({*self.file.keys}, set())
-            file = ({"file"}, set())
+            no_keys: set[str] = set()
+            by_keys = ({*self.file.keys}, no_keys)
+            by_file = ({"file"}, no_keys)
             cure = f"give either 'file' or {', '.join(map(repr, self.file.keys))}"
-            return Alternatives((keys, file), cure)
+            return Alternatives((by_keys, by_file), cure)
         return getattr(self.kind, "alternatives", None)
 
     @property

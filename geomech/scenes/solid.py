@@ -1,4 +1,4 @@
-"""Intruder scenes of triangle meshes, whose motion in three dimensions is prescribed."""
+"""Intruder scenes of triangle meshes that move in three dimensions as prescribed."""
 
 from __future__ import annotations
 
@@ -162,8 +162,8 @@ class MeshScene(Intruding):
         return faces, above
 
     def table(self, result: Passed) -> dict[str, np.ndarray]:
-        """Return the columns of a result: t; angle, or x, y, z if the body does not turn
-        about a hub; force_x, force_y, force_z, moment_x, moment_y, moment_z; and
+        """Return the columns of a result: t; angle, or x, y, z if the body does not
+        turn about a hub; force_x, force_y, force_z, moment_x, moment_y, moment_z; and
         moment, which is moment_y, as scenes of the vertical plane have it."""
         trajectory = result.trajectory
         columns = {"t": trajectory.t}

@@ -114,10 +114,11 @@ class StressKeys(_Coefficients):
 
 @dataclass(frozen=True)
 class SpatialKeys(Spatial):
-    """Give one of name, file (either with zeta, if wanted), xi_n, and density with internal_friction.
+    """Give one of name, file (either with zeta, if wanted), xi_n, and density with
+    internal_friction.
 
-    file (-): TOML with a table [medium] of the vertical plane, or CSV of plate drags with the header
-    beta,gamma,alpha_x,alpha_z (degrees, N/cm^3).
+    file (-): TOML with a table [medium] of the vertical plane, or CSV of plate drags
+    with the header beta,gamma,alpha_x,alpha_z (degrees, N/cm^3).
     """
 
     xi_n: _optional_field(Spatial, "xi_n") = None  # type: ignore[valid-type]
@@ -132,8 +133,8 @@ class SpatialKeys(Spatial):
             1,
             1e5,
             "kg/m^3",
-            "critical density of the grains, 1 to 1e5; with internal_friction, in place "
-            "of xi_n",
+            "critical density of the grains, 1 to 1e5; with internal_friction, in "
+            "place of xi_n",
         ),
     ] = None
     internal_friction: Annotated[
@@ -142,8 +143,8 @@ class SpatialKeys(Spatial):
             0.05,
             1.5,
             "-",
-            "mu, tan of the angle of repose of the grains, 0.05 to 1.5; with density, in "
-            "place of xi_n",
+            "mu, tan of the angle of repose of the grains, 0.05 to 1.5; with density, "
+            "in place of xi_n",
         ),
     ] = None
     makes = Spatial
@@ -156,8 +157,8 @@ class SpatialKeys(Spatial):
     )
 
     def to_part(self, source: Source, place: str, given: Collection[str]) -> Spatial:
-        """Return the medium. Its strength is that of the grains, or that of a map of the
-        vertical plane on a plate pushed down, or xi_n."""
+        """Return the medium. Its strength is that of the grains, or that of a map of
+        the vertical plane on a plate pushed down, or xi_n."""
         more = {
             key: getattr(self, key)
             for key in ("surface_friction", "tension", "grazing")
@@ -176,8 +177,8 @@ class MatchedKeys(SpatialKeys):
     __doc__ = SpatialKeys.__doc__
 
     def to_part(self, source: Source, place: str, given: Collection[str]) -> dict:
-        """Return the medium and, if its strength is that of a map of the vertical plane,
-        a text about the match; else ""."""
+        """Return the medium and, if its strength is that of a map of the vertical
+        plane, a text about the match; else ""."""
         medium = super().to_part(source, place, given)
         source_name = self.name or Path(self.file or "").name
         if not source_name:
@@ -228,8 +229,8 @@ def plate_drags(place: str, file) -> PlateDrags:
 def medium(name: str) -> PlateStress:
     """Return a stress map, for bodies in the vertical plane and in `rft.mujoco.attach`.
 
-    name: of a medium of the catalogue, or of a file: TOML with a table [medium], or with
-    the keys of one alone, or CSV of plate drags. ValueError for anything else.
+    name: of a medium of the catalogue, or of a file: TOML with a table [medium], or
+    with the keys of one alone, or CSV of plate drags. ValueError for anything else.
 
     Examples
     --------
@@ -246,8 +247,8 @@ def medium(name: str) -> PlateStress:
 
 
 def _read_stress(source: Source, place: str, file: str) -> PlateStress:
-    """Return the stress map of a TOML file, or of plate drags if the file's name ends as
-    that of a table (`ENDINGS`)."""
+    """Return the stress map of a TOML file, or of plate drags if the file's name ends
+    as that of a table (`ENDINGS`)."""
     path = Path(file)
     if path.suffix.lower() in ENDINGS:
         return plate_drags(place, file)

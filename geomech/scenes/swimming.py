@@ -99,8 +99,8 @@ def solvers() -> list[type]:
 
 
 def _without_fitted(tables: Mapping, name: str) -> tuple[dict, bool]:
-    """Return the tables without the minimum-perturbation frame, and whether they request
-    it: above all tables, in [body], in [system] or in [system.body]."""
+    """Return the tables without the minimum-perturbation frame, and whether they
+    request it: above all tables, in [body], in [system] or in [system.body]."""
     scene_frame = tables.get("frame")
     tables = dict(tables)
     places = []

@@ -44,8 +44,8 @@ OWNER = "a robot that walks"
 
 @dataclass(frozen=True)
 class WalkerScene:
-    """A stress map or a law of three dimensions, a robot and its gait, and effects on the
-    ground.
+    """A stress map or a law of three dimensions, a robot and its gait, and effects on
+    the ground.
 
     numerics: how finely it is computed. text: its TOML. files: that the scene names.
 
@@ -105,8 +105,8 @@ class WalkerScene:
 
 
 def with_implied_names(tables: Mapping, name: str) -> dict:
-    """Return the tables of a scene with the names that they omit: the kinds of the robot
-    and its screw, and the law."""
+    """Return the tables of a scene with the names that they omit: the kinds of the
+    robot and its screw, and the law."""
     _refuse_slope(tables, name)
     tables = {
         key: dict(table) if isinstance(table, Mapping) else table

@@ -315,7 +315,7 @@ def _table_lines(header: str, table: dict) -> list[str]:
 
 
 def _value(x: Any) -> str:
-    """Return a value as TOML. Strings and lists are as in JSON, numbers as in Python."""
+    """Return a value as TOML: strings and lists as in JSON, numbers as in Python."""
     if isinstance(x, list):
         return f"[{', '.join(map(_value, x))}]"
     if isinstance(x, dict):

@@ -27,7 +27,7 @@ SIGNS = {"+": "xi = + A alphadot", "-": "xi = - A alphadot"}
 BODY = ("lengths", "frame", "modes", "waves")  # the keys of a chain of links in a file
 LAYOUTS = ("arrays", "struct")
 ORDERS = ("ndgrid", "meshgrid")
-# Readers of files, functions parse(raw, sign, order, sha256) -> Stored. Their attributes:
+# Readers, functions parse(raw, sign, order, sha256) -> Stored. Their attributes:
 #   suffix    of the files' names
 #   write     where results can be written: a function (path, result, **settings) of a
 #             result of `geomech.studies.fields`

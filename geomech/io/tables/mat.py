@@ -368,8 +368,8 @@ def _metric(
     degree: int,
 ) -> tuple[Metric | None, float | None]:
     """Return the metric and the degree of its power; (None, None) for a file without
-    M11, M12 and M22. Without ABOUT nothing says that M is a power of drag: the degree is
-    then None. degree: of splines."""
+    M11, M12 and M22. Without ABOUT nothing says that M is a power of drag: the degree
+    is then None. degree: of splines."""
     if not {*METRIC} <= {*contents}:
         return None, None
     entries = []

@@ -51,8 +51,8 @@ MOST = 200_000  # elements; files of sysplotter have some hundreds
 class Source:
     """The bytes of a file, taken apart into elements.
 
-    order: of their bytes, "<" or ">". elements_left: that the file may still have. Their
-    number is limited because compressed bytes can hold far more of them."""
+    order: of their bytes, "<" or ">". elements_left: that the file may still have.
+    Their number is limited because compressed bytes can hold far more of them."""
 
     def __init__(self, order: str):
         self.order = order

@@ -72,7 +72,7 @@ def shape_name(axis: Variable) -> str:
 
 
 def strip_prefix(name: str, label: str) -> str:
-    """Return the name of a shape variable in its label, behind `SHAPE`; else ``name``."""
+    """Return the name that a label has behind `SHAPE`; else ``name``."""
     if label.startswith(SHAPE):
         return label.removeprefix(SHAPE)
     return name

@@ -280,8 +280,8 @@ def _check_negative(s: Mapping, A: np.ndarray) -> None:
 
 
 def _body(s: Mapping) -> tuple[dict | None, str, float | None]:
-    """Return the chain as `Stored.body` has it, the name of its frame, and its length in
-    the file's unit; chain and length are None where the file does not state them."""
+    """Return the chain as `Stored.body` has it, the name of its frame, and its length
+    in the file's unit; chain and length are None where the file does not state them."""
     if not _has(s, "geometry"):
         return None, UNKNOWN_FRAME, None
     base: Any = "center"
