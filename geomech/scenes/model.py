@@ -99,11 +99,7 @@ class Scene(Displayed):
 
     def __post_init__(self):
         with located(self.name):
-            types = {"name": str, "text": str, "files": tuple, "numerics": Numerics}
-            for name, kind in types.items():
-                value = getattr(self, name)
-                if not isinstance(value, kind):
-                    raise Refusal(f"{name} must be {kind.__name__}", value=value)
+            _check_types(self)
             gait = checked_gait(self.gait)
             object.__setattr__(self, "system", as_system(self.system, gait.joints))
             _check_joints(self.system, gait)
@@ -134,17 +130,12 @@ class Scene(Displayed):
         """Return the scene with other entries of [numerics], of the tiers or of its
         system's solver. An entry that is None stays as it is."""
         solver_keys = _field_names(solver_of(self.system))
-        keys = [*solver_keys, *_field_names(self.numerics)]
-        of_solver = {}
-        of_tiers = {}
+        changes = {key: value for key, value in changes.items() if value is not None}
+        of_solver = {key: x for key, x in changes.items() if key in solver_keys}
+        of_tiers = {key: x for key, x in changes.items() if key not in solver_keys}
         with located(self.name):
-            for key, value in changes.items():
-                if value is None:
-                    continue
-                if key in solver_keys:
-                    of_solver[key] = value
-                else:
-                    of_tiers[choose("numerics", key, keys)] = value
+            for key in of_tiers:
+                choose("numerics", key, [*solver_keys, *_field_names(self.numerics)])
             system = with_solver(self.system, of_solver)
             numerics = dataclasses.replace(self.numerics, **of_tiers)
             return dataclasses.replace(self, system=system, numerics=numerics)
@@ -174,6 +165,15 @@ class Scene(Displayed):
         gait = checked_gait(self.gait if gait is None else gait)
         alpha, alphadot = gait.cycle(phases or self.numerics.phases, amplitudes)
         return self.system.run(alpha, alphadot, work)
+
+
+def _check_types(scene: Scene) -> None:
+    """Raise Refusal for fields of wrong types; not of system and gait."""
+    types = {"name": str, "text": str, "files": tuple, "numerics": Numerics}
+    for name, kind in types.items():
+        value = getattr(scene, name)
+        if not isinstance(value, kind):
+            raise Refusal(f"{name} must be {kind.__name__}", value=value)
 
 
 def _field_names(value: Any) -> list[str]:
