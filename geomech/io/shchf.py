@@ -22,7 +22,7 @@ from geomech.io.files import read as read_bytes
 from geomech.io.files import reason_of
 from geomech.io.foreign import refuse_program
 from geomech.io.tables import mat
-from geomech.io.tables.base import LARGEST_ANGLE, numbers
+from geomech.io.tables.base import LARGEST_ANGLE, checked_numbers
 from rft.core.refusal import Refusal
 
 LARGEST = 100_000_000  # bytes
@@ -79,7 +79,7 @@ def _curve(variables: Mapping, number: int) -> Curve:
     if columns:
         t = np.linspace(0.0, 1.0, len(columns[0]))
         if "t" in variables:
-            t = numbers("t", variables["t"]).ravel()
+            t = checked_numbers("t", variables["t"]).ravel()
         fits = all(len(x) == len(t) for x in columns)
         if not fits or len(t) < 4 or not (np.diff(t) > 0).all():
             raise Refusal(
@@ -106,7 +106,9 @@ def _columns(variables: Mapping, letter: str) -> list[np.ndarray]:
     name = f"{letter}1"
     while name in variables:
         values = variables[name]
-        columns.append(numbers(name, np.nan if values is None else values).ravel())
+        columns.append(
+            checked_numbers(name, np.nan if values is None else values).ravel()
+        )
         name = f"{letter}{len(columns) + 1}"
     return columns
 
@@ -128,7 +130,7 @@ def _path(p: Mapping, number: int) -> np.ndarray | None:
             f"has p.phi_locus_full{{{number}}} without shapes",
             instead="compute the path anew in sysplotter",
         )
-    return numbers(f"p.phi_locus_full{{{number}}}.shape", shape)
+    return checked_numbers(f"p.phi_locus_full{{{number}}}.shape", shape)
 
 
 def _curve_through(name: str, t: np.ndarray, points: np.ndarray) -> Curve:

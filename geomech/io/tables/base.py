@@ -168,7 +168,7 @@ def checked_axis(
     name: str, values: np.ndarray, largest: float = LARGEST_ANGLE
 ) -> np.ndarray:
     """Return values (N,) as ascending angles, rad; Refusal if they are none."""
-    axis = numbers(name, values)
+    axis = checked_numbers(name, values)
     if axis.ndim != 1 or len(axis) < 4 or not (np.diff(axis) > 0).all():
         raise Refusal(
             "has no grid", instead=f"{name} must be at least 4 ascending angles in rad"
@@ -202,7 +202,7 @@ def is_real_number(value: Any) -> bool:
     return np.ndim(value) == 0 and np.asarray(value).dtype.kind in "iuf"
 
 
-def numbers(name: str, values: Any) -> np.ndarray:
+def checked_numbers(name: str, values: Any) -> np.ndarray:
     """Return values as floats in the machine's order of bytes; Refusal if they are no
     numbers, not finite, or too large."""
     array = np.asarray(values)
@@ -228,19 +228,19 @@ def _first_index(found: np.ndarray) -> str:
     return "index (" + ", ".join(map(str, np.argwhere(found)[0])) + ")"
 
 
-def masks(
+def check_mask(
     name: str, values: np.ndarray, masked: np.ndarray, attributes: Mapping
 ) -> None:
     """Raise Refusal unless values (..., N_1, ...) are nan at all ``masked`` shapes
     (N_1, ...) and nowhere else. A file with such shapes must declare them, by
     ``singular_shapes`` among its ``attributes``."""
     if masked.any() and "singular_shapes" not in attributes:
-        numbers(name, values)
+        checked_numbers(name, values)
     if not np.isnan(values[..., masked]).all():
         raise Refusal(
             f"has {name} at singular shapes, where A is nan", instead="write it anew"
         )
-    numbers(name, np.where(masked, 0.0, values))
+    checked_numbers(name, np.where(masked, 0.0, values))
 
 
 def checked_error(
@@ -250,7 +250,7 @@ def checked_error(
     shapes; Refusal otherwise."""
     if error.shape != A.shape:
         raise Refusal(f"has {name} of shape {error.shape} where A has {A.shape}")
-    masks(name, error, np.isnan(A).any((0, 1)), attributes)
+    check_mask(name, error, np.isnan(A).any((0, 1)), attributes)
     if (error < 0).any():
         raise Refusal(f"has {name} below 0 where it is half of an interval of A")
     return error.astype(float)

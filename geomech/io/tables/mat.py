@@ -34,14 +34,14 @@ from geomech.io.tables.base import (
     SIGNS,
     UNKNOWN_FRAME,
     Stored,
+    check_mask,
     checked_axis,
     checked_body,
     checked_error,
     checked_level,
     checked_names,
+    checked_numbers,
     detected_sign,
-    masks,
-    numbers,
     rms,
 )
 from geomech.io.tables.calc import write_struct
@@ -246,7 +246,7 @@ def _read_version_4(raw: bytes, names: Collection[str]) -> dict[str, np.ndarray]
 def _axes(contents: dict, order: str) -> tuple[tuple[np.ndarray, np.ndarray], str]:
     """Return the angles of both axes, rad, and the order in which arrays run over
     them."""
-    first, second = (numbers(name, contents[name]) for name in ANGLES)
+    first, second = (checked_numbers(name, contents[name]) for name in ANGLES)
     if first.ndim == second.ndim == 2 and min(*first.shape, *second.shape) == 1:
         if not order:
             raise Refusal(
@@ -326,7 +326,7 @@ def _entries(
     for name in ENTRIES:
         values = contents[name]
         if values.dtype.kind != "f":
-            values = numbers(name, values)
+            values = checked_numbers(name, values)
         if values.shape != expected:
             raise Refusal(
                 f"has {name} of shape {values.shape} where alpha1 and alpha2 make it "
@@ -335,7 +335,7 @@ def _entries(
         arrays.append(_as_ndgrid(values, order).astype(float))
     masked = np.isnan(arrays).any(0)
     for name, values in zip(ENTRIES, arrays):
-        masks(name, values, masked, about)
+        check_mask(name, values, masked, about)
     return np.array(arrays).reshape(3, 2, *masked.shape)
 
 
@@ -346,7 +346,7 @@ def _residual(contents: dict, A: np.ndarray, order: str, about: dict) -> np.ndar
     if isinstance(values, np.ndarray):
         values = _as_ndgrid(values, order)
         if values.shape == shape:
-            masks(RESIDUAL, values, np.isnan(A).any((0, 1)), about)
+            check_mask(RESIDUAL, values, np.isnan(A).any((0, 1)), about)
             return values.astype(float)
     return np.full(shape, np.nan)
 
@@ -374,7 +374,7 @@ def _metric(
         return None, None
     entries = []
     for name in METRIC:
-        entries.append(_as_ndgrid(numbers(name, contents[name]), order))
+        entries.append(_as_ndgrid(checked_numbers(name, contents[name]), order))
     shape = tuple(map(len, axes))
     for name, values in zip(METRIC, entries):
         if values.shape != shape:

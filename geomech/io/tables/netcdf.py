@@ -24,14 +24,14 @@ from geomech.io.tables.base import (
     SIGNS,
     UNKNOWN_FRAME,
     Stored,
+    check_mask,
     checked_axis,
     checked_body,
     checked_error,
     checked_level,
     checked_names,
+    checked_numbers,
     is_real_number,
-    masks,
-    numbers,
     rms,
 )
 from rft.core.refusal import Refusal
@@ -121,7 +121,7 @@ class _Contents:
 
     def values(self, name: str) -> np.ndarray:
         """Return a variable as finite numbers."""
-        return numbers(name, self.variables[name][1])
+        return checked_numbers(name, self.variables[name][1])
 
     def field(self, name: str, *lead: str) -> np.ndarray:
         """Return a variable over ``lead`` dimensions and the grid. Refusal if it has
@@ -283,10 +283,10 @@ def _checked_entries(contents: _Contents) -> tuple[np.ndarray, np.ndarray]:
             "rows x, y, theta"
         )
     masked = np.isnan(A).any((0, 1))
-    masks("A", A, masked, contents.attributes)
+    check_mask("A", A, masked, contents.attributes)
     is_unknown = np.isnan(residual).all() and not masked.all()
     checked_residual = np.where(is_unknown, 0.0, residual)
-    masks("fit_residual", checked_residual, masked, contents.attributes)
+    check_mask("fit_residual", checked_residual, masked, contents.attributes)
     return A, residual
 
 
@@ -358,15 +358,15 @@ def _harmonics(
         )
     return Harmonics(
         contents.axes,
-        factor * numbers("harmonics", rows),
-        numbers("harmonics_residual", residual),
+        factor * checked_numbers("harmonics", rows),
+        checked_numbers("harmonics_residual", residual),
         degree,
     )
 
 
 def _even_part(contents: _Contents) -> np.ndarray:
     """Return the rms (3, N_1, ...) of the part of xi that is even in alphadot."""
-    even = numbers("even_part", contents.field("even_part", "component"))
+    even = checked_numbers("even_part", contents.field("even_part", "component"))
     if even.shape[0] != 3:
         raise Refusal(f"has even_part of shape {even.shape} where it must be (3, ...)")
     return even
@@ -449,7 +449,7 @@ def _metric(
 
 
 def _quadratic_metric(contents: _Contents, degree: int) -> Metric:
-    M = numbers("metric", contents.field("metric", "joint", "other_joint"))
+    M = checked_numbers("metric", contents.field("metric", "joint", "other_joint"))
     joints = contents.joints
     rounding = 1e-9 * np.abs(M).max()
     if M.shape[:2] != (joints, joints) or not np.allclose(
@@ -464,7 +464,7 @@ def _quadratic_metric(contents: _Contents, degree: int) -> Metric:
 
 def _norm(contents: _Contents, degree: int) -> Finsler:
     """Return the norm of rates, as a series over their directions."""
-    rows = numbers("norm", contents.field("norm", "norm_coefficient"))
+    rows = checked_numbers("norm", contents.field("norm", "norm_coefficient"))
     if contents.joints != 2 or len(rows) % 2 == 0:
         raise Refusal(
             f"has a norm of shape {rows.shape} where it must be "
@@ -472,7 +472,7 @@ def _norm(contents: _Contents, degree: int) -> Finsler:
         )
     residual = 0 * rows[0]
     if "norm_residual" in contents:
-        residual = numbers("norm_residual", contents.field("norm_residual"))
+        residual = checked_numbers("norm_residual", contents.field("norm_residual"))
     return Finsler(contents.axes, rows, residual, degree)
 
 
@@ -496,4 +496,4 @@ def _check_pairs(contents: _Contents, masked: np.ndarray) -> None:
                 instead=SOURCE,
             )
         if not masked.any():
-            numbers(name, values)
+            checked_numbers(name, values)

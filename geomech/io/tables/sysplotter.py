@@ -38,7 +38,7 @@ from geomech.io.tables.base import (
     UNKNOWN_FRAME,
     Stored,
     checked_axis,
-    numbers,
+    checked_numbers,
     rms,
 )
 from rft.core.refusal import Refusal
@@ -197,7 +197,7 @@ def _cells(
     for k, values in enumerate(cell.reshape(count)):
         index = _matlab_index(np.unravel_index(k, lead))
         place = f"s.{path}{{{index}}}"
-        values = _numbers(place, np.nan if values is None else values)
+        values = _checked_numbers(place, np.nan if values is None else values)
         if values.shape != shape:
             raise Refusal(
                 f"has {place} of shape {values.shape} where its grid makes it {shape}",
@@ -212,8 +212,8 @@ def _matlab_index(index: Iterable[int]) -> str:
     return ", ".join(str(k + 1) for k in index)
 
 
-def _numbers(place: str, values: Any) -> np.ndarray:
-    """Return `numbers`; a Refusal of one that is not finite has its place as MATLAB
+def _checked_numbers(place: str, values: Any) -> np.ndarray:
+    """Return `checked_numbers`; a Refusal of one that is not finite has its place as MATLAB
     counts."""
     kind = getattr(values, "dtype", np.dtype(object)).kind
     if kind == "f" and not np.isfinite(values).all():
@@ -222,7 +222,7 @@ def _numbers(place: str, values: Any) -> np.ndarray:
             f"has {place} that is not finite (nan or inf) at ({index})",
             instead="mend it",
         )
-    return numbers(place, values)
+    return checked_numbers(place, values)
 
 
 def _number(s: Mapping, path: str) -> float | None:
@@ -244,7 +244,9 @@ def _axes(s: Mapping, path: str) -> tuple[np.ndarray, ...]:
             f"has s.{path} that is no cell of the grids of two angles or more",
             instead=CALC,
         )
-    grids = [_numbers(f"s.{path}{{{k + 1}}}", x) for k, x in enumerate(cell.ravel())]
+    grids = [
+        _checked_numbers(f"s.{path}{{{k + 1}}}", x) for k, x in enumerate(cell.ravel())
+    ]
     if any(x.ndim != len(grids) or x.shape != grids[0].shape for x in grids):
         shapes = ", ".join(str(x.shape) for x in grids)
         raise Refusal(f"has s.{path} of shapes {shapes}", instead=CALC)
@@ -290,11 +292,13 @@ def _body(s: Mapping) -> tuple[dict | None, str, float | None]:
     length = _number(s, "geometry.length")
     if not _has(s, "geometry.linklengths"):
         return None, _frame_in_words(base), length
-    lengths = numbers("s.geometry.linklengths", _get(s, "geometry.linklengths")).ravel()
+    lengths = checked_numbers(
+        "s.geometry.linklengths", _get(s, "geometry.linklengths")
+    ).ravel()
     length = length or float(lengths.sum())
     modes = np.zeros(0)
     if _has(s, "geometry.modes"):
-        modes = numbers("s.geometry.modes", _get(s, "geometry.modes"))
+        modes = checked_numbers("s.geometry.modes", _get(s, "geometry.modes"))
     frame = _frame(base, lengths.size)
     if not frame:
         return None, _frame_in_words(base), length
