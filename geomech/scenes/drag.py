@@ -64,7 +64,7 @@ EXCLUDED_OWNERS = {  # whose sizes of that name are not read
 }
 
 
-class Measured(NamedTuple):
+class RodDrag(NamedTuple):
     """Measured drag on a rod.
 
     rows: (4, N): psi, degrees; forces along and across, N; weight. sizes: in the header
@@ -78,7 +78,7 @@ class Measured(NamedTuple):
     ends: np.ndarray | None = None
 
 
-def read(path: str | Path) -> Measured:
+def read(path: str | Path) -> RodDrag:
     """Return the drag in a CSV file, or in one of `SAMPLES`; Refusal if it has none.
 
     Columns, in any order: psi_deg, F_parallel_N, F_perpendicular_N. Optional ones:
@@ -91,10 +91,10 @@ def read(path: str | Path) -> Measured:
     if str(path) in SAMPLES:
         source = resources.files("geomech.scenes") / "builtin" / SAMPLES[str(path)]
         with resources.as_file(source) as file:
-            return _measured(read_rows(file, LARGEST_FILE, ""))
+            return _rod_drag(read_rows(file, LARGEST_FILE, ""))
     if Path(path).suffix != ".csv" and not Path(path).exists():
         choose("drag", str(path), [*SAMPLES, "a CSV file"])
-    return _measured(
+    return _rod_drag(
         read_rows(
             path,
             LARGEST_FILE,
@@ -103,7 +103,7 @@ def read(path: str | Path) -> Measured:
     )
 
 
-def _measured(source: Rows) -> Measured:
+def _rod_drag(source: Rows) -> RodDrag:
     has_ends = bool(source.find((), ENDS))
     required = (*NEEDED, *ENDS) if has_ends else NEEDED
     columns = source.take(required, (WEIGHT,))
@@ -127,7 +127,7 @@ def _measured(source: Rows) -> Measured:
     if has_ends:
         ends = np.stack([columns[x.name] for x in ENDS])
     rows = np.stack([psi, *forces, weight])
-    return Measured(rows, sizes(source), source.name, ends)
+    return RodDrag(rows, sizes(source), source.name, ends)
 
 
 def sizes(source: Rows) -> dict[str, float]:

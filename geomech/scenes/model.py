@@ -49,7 +49,7 @@ TABLE = {  # body and medium of a table whose file does not state them
 }
 
 
-class Displayed:
+class SceneRepr:
     """The `repr` of a scene: its name and its parts, in a line of readable length."""
 
     name: str
@@ -64,7 +64,7 @@ class Displayed:
 
 
 @dataclass(frozen=True, repr=False)
-class Scene(Displayed):
+class Scene(SceneRepr):
     """A system and a gait.
 
     numerics: of the tiers; the system has its own. name: of a built-in scene, or of the

@@ -14,7 +14,7 @@ from geomech.scenes.key import Key, first_sentence, keys_of
 from geomech.scenes.keys import SCENES, all_variants, registry_of
 from geomech.scenes.sections import (
     Alternatives,
-    Declared,
+    Declaration,
     Each,
     OneOf,
     Section,
@@ -73,7 +73,7 @@ def _all_sections(references: dict[str, dict[str, Any]]) -> dict[str, Any]:
 
 
 def _scene_schema(
-    references: dict[str, Any], declared: dict[str, Declared]
+    references: dict[str, Any], declared: dict[str, Declaration]
 ) -> dict[str, Any]:
     """Return the schema of a scene with sections. references: to their schemas, by
     name."""

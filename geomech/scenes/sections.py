@@ -164,7 +164,7 @@ class Variant(NamedTuple):
         return ", ".join(f'{key} = "{name}"' for key, name in self.named.items())
 
 
-class Declared(NamedTuple):
+class Declaration(NamedTuple):
     """A section of a file, or a key above all sections. required: it must be there,
     unless the section ``instead`` is."""
 
@@ -212,17 +212,17 @@ def keys_in(variant: Variant) -> list[Key]:
 
 
 @functools.cache
-def sections_of(scene: type) -> dict[str, Declared]:
+def sections_of(scene: type) -> dict[str, Declaration]:
     """Return the sections that the fields of a scene declare, by name. Fields that are
     keys of a section (`Within`) are put together into a class."""
     hints = get_type_hints(scene, include_extras=True)
-    declared: dict[str, Declared] = {}
+    declared: dict[str, Declaration] = {}
     within: dict[Within, list] = {}
     for part in dataclasses.fields(scene):
         for mark in get_args(hints[part.name])[1:]:
             if isinstance(mark, Section):
                 required = part.default is part.default_factory is dataclasses.MISSING
-                declared[part.name] = Declared(mark, required)
+                declared[part.name] = Declaration(mark, required)
             elif isinstance(mark, Within):
                 within.setdefault(mark, []).append(
                     (part.name, hints[part.name], part.default)
@@ -235,23 +235,23 @@ def sections_of(scene: type) -> dict[str, Declared]:
         members = {"makes": scene, "to_part": to_part}
         kind = dataclasses.make_dataclass(name.title(), keys, namespace=members)
         kind.__doc__ = ""  # in place of a signature
-        declared[name] = Declared(Keys(kind, owner))
+        declared[name] = Declaration(Keys(kind, owner))
     return declared
 
 
-def file_sections(scene: type) -> dict[str, Declared]:
+def file_sections(scene: type) -> dict[str, Declaration]:
     """Return the sections that a scene's file may have, by name: those of its fields,
     those that replace another one, and those that apply to the whole scene
     (``once``)."""
-    declared: dict[str, Declared] = {}
+    declared: dict[str, Declaration] = {}
     for name, (section, required, _) in sections_of(scene).items():
         parts: Mapping[str, Section] = {}
         if isinstance(section, OneOf) and section.short:
             parts = section.inner[section.short]
         for part, inner in parts.items():
             is_required = not isinstance(inner, Each)
-            declared[part] = Declared(inner, is_required, instead=name)
-        declared[name] = Declared(section, required and not parts)
+            declared[part] = Declaration(inner, is_required, instead=name)
+        declared[name] = Declaration(section, required and not parts)
     for name, section in getattr(scene, "once", {}).items():
-        declared[name] = Declared(section)
+        declared[name] = Declaration(section)
     return declared

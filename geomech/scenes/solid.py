@@ -46,7 +46,7 @@ TRIANGLES = (
 )
 
 
-class Passed(NamedTuple):
+class MeshIntrusion(NamedTuple):
     """Forces along a motion, in the world frame.
 
     force: (T, 3), N, with the weights of effects. moment: (T, 3), N m, about the mesh's
@@ -66,7 +66,7 @@ class Passed(NamedTuple):
         force = ", ".join(f"{a} {span(x)}" for a, x in zip("xyz", self.force.T))
         moment = ", ".join(f"{a} {span(x)}" for a, x in zip("xyz", self.moment.T))
         described = f"force {force} N; moment {moment} N m; power {span(self.power)} W"
-        return f"Passed({len(self.t)} poses, t {span(self.t)} s; {described})"
+        return f"MeshIntrusion({len(self.t)} poses, t {span(self.t)} s; {described})"
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ class MeshScene(Intruding):
     def size(self) -> float:
         return float(np.ptp(self.mesh.vertices, axis=0).max())
 
-    def run(self, triangles: int | None = None) -> Passed:
+    def run(self, triangles: int | None = None) -> MeshIntrusion:
         """Return forces along the motion. triangles: in place of the scene's."""
         mesh = self.mesh
         if triangles is not None:
@@ -148,9 +148,9 @@ class MeshScene(Intruding):
             self.medium, mesh, rotation, place, velocity, spin, self.effects
         )
         force = self.weighed(result.force)
-        return Passed(trajectory, force, result.moment, result.power)
+        return MeshIntrusion(trajectory, force, result.moment, result.power)
 
-    def faces(self, result: Passed, k: int) -> tuple[Faces, np.ndarray]:
+    def faces(self, result: MeshIntrusion, k: int) -> tuple[Faces, np.ndarray]:
         """Return the loads on each face below the surface at step k, and the triangles
         (Q, 3, 3) above it, m."""
         _, place, rotation, velocity, spin, _ = (x[k] for x in result.trajectory)
@@ -161,7 +161,7 @@ class MeshScene(Intruding):
         )
         return faces, above
 
-    def table(self, result: Passed) -> dict[str, np.ndarray]:
+    def table(self, result: MeshIntrusion) -> dict[str, np.ndarray]:
         """Return the columns of a result: t; angle, or x, y, z if the body does not
         turn about a hub; force_x, force_y, force_z, moment_x, moment_y, moment_z; and
         moment, which is moment_y, as scenes of the vertical plane have it."""
