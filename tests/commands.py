@@ -65,7 +65,7 @@ def own_parts():
         {group: dict(registry) for group, registry in REGISTRIES.items()},
         set(sys.modules),
     )
-    with mock.patch.multiple(kinds, _texts={}, _files={}):
+    with mock.patch.multiple(kinds, _sources={}, _files={}):
         yield
     for group, registry in REGISTRIES.items():
         registry.restore(before.get(group, registry))

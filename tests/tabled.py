@@ -5,7 +5,7 @@ import json
 import numpy as np
 
 from geomech.core.variables import Result, Variable
-from geomech.io.results import of_dict
+from geomech.io.results import from_dict
 from geomech.tiers import TIERS
 
 QUANTITIES = ("x", "y", "heading", "net_distance")
@@ -139,7 +139,7 @@ def of_swept(table, unit="m"):
 
 def of_json(out):
     """Return the result that a command printed as JSON."""
-    return of_dict(json.loads(out))
+    return from_dict(json.loads(out))
 
 
 def tabled_json(out):

@@ -143,7 +143,7 @@ def test_the_command_prints_them_all_or_a_section(printed):
 
 
 def test_keys_of_ones_own_classes_are_told(tmp_path, monkeypatch):
-    monkeypatch.setattr(kinds, "_texts", {})
+    monkeypatch.setattr(kinds, "_sources", {})
     section = (
         (ROOT / ".docs" / "how-it-works" / "extending.md")
         .read_text()

@@ -509,7 +509,7 @@ def test_digests_of_own_code_cover_its_sources(name, tmp_path, monkeypatch):
         )
         for module in [module for module in sys.modules if module.startswith("thick_")]:
             monkeypatch.delitem(sys.modules, module)
-        monkeypatch.setattr(kinds, "_texts", {})
+        monkeypatch.setattr(kinds, "_sources", {})
         importlib.invalidate_caches()
         load_file(tmp_path / "thick.py")
         found.append(kinds.code())

@@ -645,7 +645,7 @@ class Power:
 
 def test_edited_code_resumes_nothing(tmp_path, fine, monkeypatch):
     """That of a law in a file of one's own, which a stopped command has used."""
-    for name in ("_texts", "_files"):
+    for name in ("_sources", "_files"):
         monkeypatch.setattr(kinds, name, {})
     monkeypatch.setattr(LAWS, "_parts", dict(LAWS))
     text = VISCOUS.text.replace('law = "viscous"', 'law = "power-of-jobs"').replace(

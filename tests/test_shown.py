@@ -64,9 +64,9 @@ def test_an_intrusion_is_told_in_a_line():
 def test_an_intrusion_of_a_mesh_is_told_in_a_line():
     found = load("sphere").changed(triangles=80).run()
     told = repr(found)
-    assert told.startswith("Passed(11 poses, t 0 to 10 s; force x -") and told.endswith(
-        " W)"
-    )
+    assert told.startswith(
+        "MeshIntrusion(11 poses, t 0 to 10 s; force x -"
+    ) and told.endswith(" W)")
     assert (
         f"z {found.force[:, 2].min():.3g}" in told
         and f"y {found.moment[:, 1].min():.3g}" in told

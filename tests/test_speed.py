@@ -13,7 +13,7 @@ from tabled import swept_table, tabled
 
 from geomech import scenes
 from geomech.gaits import Circle
-from geomech.io.results import of_dict
+from geomech.io.results import from_dict
 from geomech.studies import report, sweep, undulation
 from geomech.studies.choose import cheapest
 from geomech.studies.scene_tables import SceneTables
@@ -278,7 +278,7 @@ def test_the_command_gives_it(tmp_path):
     (tmp_path / "s.toml").write_text(CHAIN)
     args = ("--amplitudes", "1", "--tiers", "direct", "--json")
     out = geomech("displacement", "s.toml", *args, cwd=tmp_path)[1]
-    found = of_dict(json.loads(out))
+    found = from_dict(json.loads(out))
     distance = float(found["net_distance"][0, 0])
     assert float(found["speed"][0, 0]) == pytest.approx(2.5 * distance)
 

@@ -1003,7 +1003,7 @@ def parts_of_a_file():
 def read_parts(change=lambda variables, units, attributes: None, sign=""):
     parts = parts_of_a_file()
     change(*parts)
-    return netcdf._stored(*parts, sign, "0f")
+    return netcdf._stored(netcdf._Contents(*parts), sign, "0f")
 
 
 def test_every_part_of_a_file_is_where_it_belongs():
@@ -1225,10 +1225,14 @@ def parts_of_a_gait(**changes):
 OF_A_GAIT = {"level": 0.9, "error_factor": 2.1}
 
 
+def taylor_series(variables, attributes, factor):
+    return netcdf._taylor_series(netcdf._Contents(variables, {}, attributes), factor)
+
+
 def test_parts_of_a_gait_are_where_they_belong():
     parts = {name: values for name, (_, values) in parts_of_a_gait().items()}
     for turn in (1.0, -1.0):
-        found = netcdf._taylor_series(parts_of_a_gait(), OF_A_GAIT, turn)
+        found = taylor_series(parts_of_a_gait(), OF_A_GAIT, turn)
         for name, values in (
             ("A", turn * parts["gait_A"]), ("slope", turn * parts["gait_slope"]), ("errors", turn * parts["gait_errors"]),
             ("spread", parts["gait_spread"]), ("beyond", [0.1, 0.2, 0.3]), ("standard_error", np.abs(parts["gait_off"])),
@@ -1237,9 +1241,7 @@ def test_parts_of_a_gait_are_where_they_belong():
         np.testing.assert_array_equal(found.loop.coefficients, parts["gait"])
         assert (found.level, found.factor) == (0.9, 2.1)
     assert (
-        netcdf._taylor_series(
-            parts_of_a_gait(gait_off=None), OF_A_GAIT, 1.0
-        ).standard_error
+        taylor_series(parts_of_a_gait(gait_off=None), OF_A_GAIT, 1.0).standard_error
         == np.zeros((3, 2, 1))
     ).all()
 
@@ -1275,7 +1277,7 @@ def test_parts_of_a_gait_are_where_they_belong():
     ],
 )  # fmt: skip
 def test_parts_of_a_gait_fit_each_other_or_are_refused(changes, facts, said):
-    read = lambda: netcdf._taylor_series(
+    read = lambda: taylor_series(
         parts_of_a_gait(**changes), {**OF_A_GAIT, **facts}, 1.0
     )
     if not said:

@@ -10,7 +10,7 @@ from tabled import swept_table, tabled
 
 from geomech import plots, scenes
 from geomech.gaits import Butterfly, Ellipse
-from geomech.io.results import of_dict
+from geomech.io.results import from_dict
 from geomech.scenes import Scene
 from geomech.studies import sweep, uncertainty
 from geomech.studies.choose import cheapest
@@ -315,7 +315,7 @@ def test_the_command_gives_it(tmp_path):
     )
     code, out, err = geomech(*args, cwd=tmp_path)
     assert (code, err) == (0, "")
-    found, loaded = of_dict(json.loads(out)), scenes.load(tmp_path / "s.toml")
+    found, loaded = from_dict(json.loads(out)), scenes.load(tmp_path / "s.toml")
     told = uncertainty.of_medium(loaded, loaded.gait, np.array([1.0]))
     spread = np.hypot(found["x"].spread, found["y"].spread)
     assert spread[0] == pytest.approx(told["position"])

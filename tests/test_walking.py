@@ -16,7 +16,7 @@ from figures.walking_sensitivity import Sheet
 from geomech import films, plots, scenes
 from geomech.core.variables import Result
 from geomech.describe.explain import explained
-from geomech.io.results import of_dict
+from geomech.io.results import from_dict
 from geomech.plots.walking import walk_stage
 from geomech.questions import walk as questions_walk
 from geomech.scenes import WalkerScene
@@ -833,7 +833,7 @@ def test_walk_as_a_command(geomech, tmp_path):
         "walk", "small.toml", "--json", "-o", "out", "--plot", "walk.png", "--strip"
     )
     assert (code, err) == (0, "")
-    found = of_dict(json.loads(out))
+    found = from_dict(json.loads(out))
     t, x = found["t"].values, found["x"].values
     assert t[0] == 0 and t[-1] == pytest.approx(2.0)
     assert str(found["status"].values) == "walking"

@@ -70,7 +70,7 @@ def read(path: str | Path) -> Frames:
         raise Refusal(
             "x and y are in two units", where=source.place, instead="keep one"
         )
-    source.tell(notes)
+    source.issue(notes)
     rows = np.stack([*values.values()], -1)
     keyed = columns[1] in ("s", "point")
     along = np.arange(len(rows))
@@ -108,7 +108,7 @@ def _columns(source: Rows) -> tuple[tuple[str, ...], Column]:
             return header, clock
     headers = " or ".join(",".join(header) for header in HEADERS)
     raise Refusal(
-        f"the header must be {headers}", where=source.place, because=source.found
+        f"the header must be {headers}", where=source.place, because=source.header_text
     )
 
 

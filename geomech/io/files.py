@@ -1,4 +1,5 @@
-"""Files on disk: read within limits, written whole or not at all, never over an input, and without leftovers."""
+"""Files on disk: read within limits; written whole or not at all, never over an input,
+and without leftovers."""
 
 from __future__ import annotations
 
@@ -17,13 +18,13 @@ from rft.core.refusal import Refusal, printable
 
 try:
     import fcntl
-except ImportError:  # no such locks on Windows: what a kill leaves there is left
+except ImportError:  # Windows has no such locks: folders of killed writers stay there
     fcntl = None
 
-MARK = "owner"  # in a folder of ours, locked while its owner lives
-NEW = "new"  # beside the mark: what is being written
-ABANDONED = 60.0  # seconds after which a folder of ours without a mark has no owner who is about to set one
-NAME_MARGIN = 24  # bytes of a name left for what is added to it
+MARK = "owner"  # a file in a staging folder, locked while its owner lives
+NEW = "new"  # a folder beside the mark, with the files being written
+ABANDONED = 60.0  # s (assumed): an older staging folder without a mark has no owner
+NAME_MARGIN = 24  # bytes of a name that are reserved for endings
 DISK_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 
@@ -33,23 +34,26 @@ def note(text: str) -> None:
 
 
 def read(path: str | Path, largest: int, pipes: bool = False) -> bytes:
-    """Return the bytes of an ordinary file of at most ``largest`` bytes; OSError or ValueError otherwise, before
-    anything is read. pipes: take a pipe that somebody writes to, too."""
+    """Return the bytes of an ordinary file of at most ``largest`` bytes; OSError or
+    ValueError otherwise. pipes: also read a pipe that another program writes to."""
     path = Path(path)
-    if path.stat() and not (path.is_file() or (pipes and path.is_fifo())):
+    path.stat()  # OSError where there is nothing of that name
+    is_pipe = path.is_fifo()
+    if not path.is_file() and not (pipes and is_pipe):
         raise OSError(errno.EINVAL, "it is no ordinary file")
-    with open(path, "rb", opener=_opened if path.is_fifo() else None) as file:
-        if (
-            os.fstat(file.fileno()).st_size > largest
-            or len(raw := file.read(largest + 1)) > largest
-        ):
-            raise OSError(errno.EFBIG, f"it is larger than {largest / 1e6:g} MB")
-        if not raw and path.is_fifo():
+    too_large = OSError(errno.EFBIG, f"it is larger than {largest / 1e6:g} MB")
+    with open(path, "rb", opener=_open_pipe if is_pipe else None) as file:
+        if os.fstat(file.fileno()).st_size > largest:
+            raise too_large
+        raw = file.read(largest + 1)
+        if len(raw) > largest:
+            raise too_large
+        if not raw and is_pipe:
             raise OSError(errno.EPIPE, "nothing came through this pipe")
     return raw
 
 
-def _opened(path: str, flags: int) -> int:
+def _open_pipe(path: str, flags: int) -> int:
     """Return a descriptor of a pipe, without waiting for a writer."""
     pipe = os.open(path, flags | os.O_NONBLOCK)
     os.set_blocking(pipe, True)
@@ -57,13 +61,9 @@ def _opened(path: str, flags: int) -> int:
 
 
 def read_text(path: str | Path, largest: int, pipes: bool = False) -> str:
-    """Return the text of an ordinary file, or a pipe, in UTF-8, as `read`, with equal line ends."""
-    return (
-        read(path, largest, pipes)
-        .decode("utf-8-sig")
-        .replace("\r\n", "\n")
-        .replace("\r", "\n")
-    )
+    """Return the text of a file in UTF-8, read as by `read`, with line ends \\n."""
+    text = read(path, largest, pipes).decode("utf-8-sig")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def reason_of(error: Exception) -> str:
@@ -72,11 +72,11 @@ def reason_of(error: Exception) -> str:
 
 
 def hidden(path: Path, ending: str) -> Path:
-    """Return a hidden name beside ``path`` that depends on it alone; short where the file system would refuse the long
-    one."""
+    """Return the path of a hidden file beside ``path``, which depends on it alone; it
+    is short where the file system would refuse a long name."""
     name = f".{path.name}{ending}"
     if len(os.fsencode(name)) + NAME_MARGIN > _longest_name(path.parent):
-        name = f".geomech-{_key(Path(path.name))}{ending}"
+        name = f".geomech-{_digest(Path(path.name))}{ending}"
     return path.with_name(name)
 
 
@@ -88,7 +88,8 @@ def _longest_name(folder: Path) -> int:
 
 
 def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
-    """Raise Refusal if an output is the same file as an input, by whatever name or link."""
+    """Raise Refusal if an output is the same file as an input, under any name or
+    link."""
     inputs = list(inputs)
     for output in outputs:
         for source in inputs:
@@ -103,66 +104,77 @@ def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
 
 @contextlib.contextmanager
 def atomic_file(path: str | Path) -> Iterator[Path]:
-    """Yield a path to write to, of the same name; moved to ``path`` on success, removed on failure. Refusal if nothing
-    can be written there."""
-    refused = lambda error: Refusal(
-        f"cannot write {path}",
-        because=reason_of(error),
-        instead="choose another output",
-    )
+    """Yield a path to write to, with the same name. Its file moves to ``path`` on
+    success, and is removed on failure. Refusal if nothing can be written there."""
+
+    def refusal(error: Exception) -> Refusal:
+        return Refusal(
+            f"cannot write {path}",
+            because=reason_of(error),
+            instead="choose another output",
+        )
+
     try:
         target = Path(path).resolve()
         if target.exists() and not target.is_file():
             raise OSError("it is no ordinary file")
+        # Within a staging folder the user knows the name alone.
         displayed = target.name if target.parent.name == NEW else path
     except (OSError, RuntimeError, ValueError) as error:
-        raise refused(error) from None
-    with _StagingFolder(target, target.parent, refused) as new:
+        raise refusal(error) from None
+    with _StagingFolder(target, target.parent, refusal) as new:
         try:
             yield new / target.name
             os.replace(new / target.name, target)
         except OSError as error:
-            raise _unwritten(displayed, error) from None
+            raise _write_error(displayed, error) from None
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write text in UTF-8, other characters escaped; the file appears whole or not at all."""
+    """Write text in UTF-8, with backslashes for characters that it cannot encode; the
+    file appears whole or not at all."""
     with atomic_file(path) as part:
         part.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
 @contextlib.contextmanager
 def atomic_folder(path: str | Path, inputs: Iterable[Path] = ()) -> Iterator[Path]:
-    """Yield a folder to fill; its files move to ``path`` on success, with a note of the files they replace, and vanish
-    on failure. Refusal if that is impossible, or if one would replace an input."""
-    refused = lambda error: Refusal(
-        f"cannot write the folder {path}",
-        because=reason_of(error),
-        instead="choose another with -o",
-    )
+    """Yield a folder to fill. Its files move to ``path`` on success, with a note of the
+    files that they replace, and are removed on failure. Refusal if they cannot be
+    written there, or if one would replace an input."""
+
+    def refusal(error: Exception) -> Refusal:
+        return Refusal(
+            f"cannot write the folder {path}",
+            because=reason_of(error),
+            instead="choose another with -o",
+        )
+
     try:
         target = Path(path).resolve()
         if os.path.lexists(target) and not target.is_dir():
             raise OSError("it is not a folder")
         existing = next(p for p in (target, *target.parents) if p.exists())
     except (OSError, RuntimeError, ValueError) as error:
-        raise refused(error) from None
-    with _StagingFolder(target, existing, refused) as new:
+        raise refusal(error) from None
+    with _StagingFolder(target, existing, refusal) as new:
         try:
             yield new
             _move(sorted(new.iterdir()), target, Path(path), inputs)
         except OSError as error:
-            raise _unwritten(f"the folder {path}", error) from None
+            raise _write_error(f"the folder {path}", error) from None
 
 
 def _move(files: list[Path], target: Path, path: Path, inputs: Iterable[Path]) -> None:
+    """Move files to the folder ``target``, which messages call ``path``."""
     replaced = [file.name for file in files if os.path.lexists(target / file.name)]
-    if blocked := [name for name in replaced if not (target / name).is_file()]:
-        raise Refusal(
-            f"cannot write {path / blocked[0]}",
-            because="it is no ordinary file",
-            instead="choose another with -o",
-        )
+    for name in replaced:
+        if not (target / name).is_file():
+            raise Refusal(
+                f"cannot write {path / name}",
+                because="it is no ordinary file",
+                instead="choose another with -o",
+            )
     refuse_inputs([path / name for name in replaced], inputs)
     target.mkdir(parents=True, exist_ok=True)
     for file in files:
@@ -171,8 +183,9 @@ def _move(files: list[Path], target: Path, path: Path, inputs: Iterable[Path]) -
         note(f"replaced in {path}: {', '.join(replaced)}")
 
 
-def _unwritten(what: object, error: OSError) -> Exception:
-    """Return the error to raise: for a full disk a Refusal with the file's name; others unchanged."""
+def _write_error(what: object, error: OSError) -> Exception:
+    """Return the error to raise: a Refusal with the name of the file for a full disk,
+    else the error itself."""
     if error.errno not in DISK_FULL:
         return error
     return Refusal(
@@ -183,17 +196,23 @@ def _unwritten(what: object, error: OSError) -> Exception:
 
 
 class _StagingFolder:
-    """A hidden folder in ``parent`` in which the files for ``target`` are made; removed at the end.
+    """A hidden folder in ``parent`` in which the files for ``target`` are written;
+    removed at the end.
 
-    Its owner holds a lock on a mark in it. A kill leaves the folder and frees the lock: that is how the next writer to
-    the same target recognises a stray, and removes it. The name is chosen before the folder exists, so a signal at any
-    moment removes it, too. refused: returns the exception for an error of the file system at the start.
+    Its owner holds a lock on a mark in it. A kill leaves the folder and frees the lock;
+    the next writer to the same target recognises a stray folder by that, and removes
+    it.
+    The name is chosen before the folder exists, so that it is also removed after a
+    signal at any moment. refusal: returns the exception for an error of the file system
+    at the start.
     """
 
     def __init__(
-        self, target: Path, parent: Path, refused: Callable[[Exception], Exception]
+        self, target: Path, parent: Path, refusal: Callable[[Exception], Exception]
     ):
-        self.target, self.parent, self.refused = target, parent, refused
+        self.target = target
+        self.parent = parent
+        self.refusal = refusal
         self.folder = parent / f"{_prefix(target)}{secrets.token_hex(8)}"
         self.mark = None
 
@@ -208,7 +227,7 @@ class _StagingFolder:
         except BaseException as error:
             self.__exit__()
             if isinstance(error, (OSError, ValueError)):
-                raise self.refused(error) from None
+                raise self.refusal(error) from None
             raise
         return self.folder / NEW
 
@@ -221,18 +240,18 @@ class _StagingFolder:
         finally:
             if self.mark:
                 self.mark.close()
-            if (
-                self.folder.is_dir()
-            ):  # too many files are open: now there is one fewer, which is enough
-                _discard_plainly(self.folder)
+            if self.folder.is_dir():
+                # Too many files were open. Without the mark there is one fewer, which
+                # is enough for a slower way.
+                _discard_with_one_file(self.folder)
 
 
-def _key(target: Path) -> str:
+def _digest(target: Path) -> str:
     return hashlib.sha256(os.fsencode(target)).hexdigest()[:16]
 
 
 def _prefix(target: Path) -> str:
-    return f".geomech-{_key(target)}-"
+    return f".geomech-{_digest(target)}-"
 
 
 def _mark_text(target: Path) -> bytes:
@@ -240,7 +259,8 @@ def _mark_text(target: Path) -> bytes:
 
 
 def _locked(file) -> bool:
-    """Return whether the file is now locked by this process; False if by another, or on a system without locks."""
+    """Lock a file, and return whether this process now has the lock; False if another
+    one has it, or on a system without locks."""
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except (AttributeError, OSError):
@@ -249,15 +269,15 @@ def _locked(file) -> bool:
 
 
 def _discard(folder: Path) -> None:
-    """Remove a folder of ours, its mark last."""
+    """Remove a staging folder, its mark last."""
     shutil.rmtree(folder / NEW, ignore_errors=True)
     with contextlib.suppress(OSError):
         (folder / MARK).unlink(missing_ok=True)
         folder.rmdir()
 
 
-def _discard_plainly(folder: Path) -> None:
-    """Remove a folder of ours, with one open file at a time."""
+def _discard_with_one_file(folder: Path) -> None:
+    """Remove a staging folder, with one open file at a time."""
     for place, folders, names in os.walk(folder, topdown=False):
         for remove, entries in ((os.unlink, names), (os.rmdir, folders)):
             for name in entries:
@@ -268,16 +288,18 @@ def _discard_plainly(folder: Path) -> None:
 
 
 def sweep_strays(target: Path, *more: Path) -> None:
-    """Remove the folders of killed writers to ``target``, and no others, from its folder and ``more``."""
-    for place in {target.parent, *more}:
+    """Remove the staging folders of killed writers to ``target``, and no others, from
+    its folder and ``more``."""
+    prefix = _prefix(target)
+    for folder in {target.parent, *more}:
         with contextlib.suppress(OSError, ValueError):
-            for path in [
-                p for p in place.iterdir() if p.name.startswith(_prefix(target))
-            ]:
+            strays = [path for path in folder.iterdir() if path.name.startswith(prefix)]
+            for path in strays:
                 _sweep(path, target)
 
 
 def _sweep(path: Path, target: Path) -> None:
+    """Remove a staging folder that no writer owns."""
     if path.is_symlink() or not path.is_dir():
         return
     with contextlib.suppress(OSError):

@@ -1,4 +1,5 @@
-"""Files of other programs that are no tables of text: what they are, and what to export."""
+"""Files of other programs that are no tables of text: their kinds, and what to export
+instead."""
 
 from __future__ import annotations
 
@@ -14,6 +15,7 @@ TRACKS = (
 SPREADSHEET = "save the sheet as CSV"
 BAG = "export its topic as CSV, for example by rostopic echo -p"
 MATLAB = "write its columns as CSV by writematrix or writetable"
+NUMPY = "write it by numpy.savetxt, with header and comments=''"
 TEXT = "write its columns as CSV, for example by pandas.DataFrame.to_csv"
 SIGNATURES = (  # the first bytes of a file, what it is, and the cure
     (b"\x89HDF\r\n\x1a\n", "an HDF5 file", TRACKS),
@@ -23,7 +25,7 @@ SIGNATURES = (  # the first bytes of a file, what it is, and the cure
     (b"#ROSBAG", "a ROS bag", BAG),
     (b"\x89MCAP", "a ROS bag (MCAP)", BAG),
     (b"SQLite format 3\x00", "a database, as of ROS 2 bags", BAG),
-    (b"\x93NUMPY", "a NumPy array", "write it by numpy.savetxt, with header and comments=''"),
+    (b"\x93NUMPY", "a NumPy array", NUMPY),
     (b"PAR1", "a Parquet file", TEXT),
     (b"\x1f\x8b", "a gzip file", "unpack it"),
 )  # fmt: skip
@@ -51,28 +53,30 @@ def refuse_program(path: str | Path) -> None:
 
 
 def refuse_foreign(path: str | Path, raw: bytes) -> None:
-    """Raise Refusal for the bytes of a file that is known, and no table of text."""
+    """Raise Refusal for a file of a kind that is known, and that is no table of text.
+    raw: its bytes."""
     refuse_program(path)
-    what, cure = "", ""
-    for start, name, remedy in SIGNATURES:
+    kind, cure = _kind_and_cure(path, raw)
+    if kind:
+        raise Refusal(f"it is {kind}", where=Path(path).name, instead=cure)
+
+
+def _kind_and_cure(path: str | Path, raw: bytes) -> tuple[str, str]:
+    """Return the kind of a file, and the cure; "" for both if it may be a table."""
+    for start, kind, cure in SIGNATURES:
         if raw.startswith(start):
-            what, cure = name, remedy
-            break
-    if not what and raw.lstrip()[:1] in (b"{", b"["):
-        what, cure = _json(path, raw)
-    if what:
-        raise Refusal(f"it is {what}", where=Path(path).name, instead=cure)
-
-
-def _json(path: str | Path, raw: bytes) -> tuple[str, str]:
-    """Return what a file of JSON is, and the cure; "" for both if it is none."""
+            return kind, cure
+    if raw.lstrip()[:1] not in (b"{", b"["):
+        return "", ""
     try:
         content = json.loads(raw)
     except (ValueError, RecursionError):
         return "", ""
     if isinstance(content, dict) and {"units", "data"} <= {*content}:
-        each = "write a row t,point,x,y for each point of t, x, y in its data"
-        return "a WCON file (JSON)", each
+        return (
+            "a WCON file (JSON)",
+            "write a row t,point,x,y for each point of t, x, y in its data",
+        )
     if Path(path).suffix.lower() == ".wcon":
         return "a WCON file (JSON)", "write its points as rows t,point,x,y"
     return "JSON", "write its values as a CSV file, a row for each time"

@@ -1,8 +1,8 @@
-"""Results as files and as plain data: NetCDF (classic format, which every NetCDF library
-opens), JSON, CSV, MAT, and data sets of xarray.
+"""Results as files and as plain data: NetCDF (classic format, which every NetCDF
+library opens), JSON, CSV, MAT, and data sets of xarray.
 
-All have the names of the variables; errors and spreads are NAME_error and NAME_spread in
-all of them. `geomech.results.files` knows which kind has which of these formats.
+All have the names of the variables; errors and spreads are NAME_error and NAME_spread
+in all of them. `geomech.results.files` knows which kind has which of these formats.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ KIND = "kind"
 FORMAT = "geomech_format"
 VERSION = 1
 ORDER = "order_of_variables"  # SciPy writes variables in an order of its own
-ROWS_TOGETHER = 10_000  # of a CSV file, as text in memory at a time
+ROWS_TOGETHER = 10_000  # of a CSV file, that are in memory as text at a time
 LARGEST_INTEGER = 2**31 - 1  # of a NetCDF file of the classic format
 
 
@@ -39,52 +39,54 @@ def flat(result: Result) -> Iterator[Variable]:
                     variable.dims,
                     values,
                     variable.unit,
-                    described(variable, name),
+                    companion_label(variable, name),
                 )
 
 
-def described(variable: Variable, name: str) -> str:
-    """Return the label of an error or a spread in a file."""
+def companion_label(variable: Variable, name: str) -> str:
+    """Return the label of the error or the spread of a variable in a file."""
     if name == "spread":
         return f"standard deviation of {variable.name}"
     return variable.error_label or f"estimated error of {variable.name}"
 
 
-def joined(
+def join_companions(
     kind: str, variables: Iterable[Variable], attributes: dict[str, Any]
 ) -> Result:
-    """Return the result of the variables of a file."""
+    """Return the result of the variables of a file: errors and spreads become members
+    of the variables to which they belong."""
     by_name = {v.name: v for v in variables}
-    whole = []
+    variables_with_errors = []
     for name, variable in by_name.items():
-        if owner_of(name, by_name) is not None:
+        if companion_owner(name, by_name) is not None:
             continue
         more: dict[str, Any] = {}
         for ending, field in ENDINGS.items():
-            if owner_of(name + ending, by_name) == name:
+            if companion_owner(name + ending, by_name) == name:
                 more[field] = by_name[name + ending].values
         variable = replace(variable, **more)
         if "error" in more:
             label = by_name[f"{name}_error"].label
-            if label != described(variable, "error"):
+            if label != companion_label(variable, "error"):
                 variable = replace(variable, error_label=label)
-        whole.append(variable)
-    return Result(kind, tuple(whole), attributes)
+        variables_with_errors.append(variable)
+    return Result(kind, tuple(variables_with_errors), attributes)
 
 
-def owner_of(name: str, by_name: dict[str, Variable]) -> str | None:
-    """Return the name of the variable, over the same dimensions, of which this one is the
-    error or the spread."""
+def companion_owner(name: str, by_name: dict[str, Variable]) -> str | None:
+    """Return the name of the variable, over the same dimensions, of which this one is
+    the error or the spread."""
     for ending in ENDINGS:
-        owner, one = by_name.get(name.removesuffix(ending)), by_name.get(name)
-        if owner is None or one is None or owner is one:
+        owner = by_name.get(name.removesuffix(ending))
+        companion = by_name.get(name)
+        if owner is None or companion is None or owner is companion:
             continue
-        if owner.dims == one.dims:
+        if owner.dims == companion.dims:
             return owner.name
     return None
 
 
-def facts(variable: Variable) -> dict[str, str]:
+def variable_attributes(variable: Variable) -> dict[str, str]:
     """Return the attributes of a variable in a file."""
     named = {
         "units": variable.units,
@@ -95,30 +97,36 @@ def facts(variable: Variable) -> dict[str, str]:
 
 
 def variable_of(
-    name: str, dims: tuple[str, ...], values: np.ndarray, facts: dict[str, str]
+    name: str, dims: tuple[str, ...], values: np.ndarray, attributes: dict[str, str]
 ) -> Variable:
-    """Return the variable of a file."""
-    unit: Any = facts.get("units", "")
-    parts = tuple(unit.split(", "))
-    plain_words = "(" not in facts.get("units", "")
-    if len(parts) > 1 and plain_words and dims and len(parts) == values.shape[0]:
+    """Return the variable of a file from its attributes (`variable_attributes`)."""
+    units = attributes.get("units", "")
+    unit: Any = units
+    # A list of units has one for each entry along the first dimension.
+    parts = tuple(units.split(", "))
+    if len(parts) > 1 and "(" not in units and dims and len(parts) == values.shape[0]:
         unit = parts
     return Variable(
-        name, dims, values, unit, facts.get("long_name", ""), zero=facts.get("zero", "")
+        name,
+        dims,
+        values,
+        unit,
+        attributes.get("long_name", ""),
+        zero=attributes.get("zero", ""),
     )
 
 
-def about(result: Result) -> dict[str, Any]:
+def file_attributes(result: Result) -> dict[str, Any]:
     """Return the attributes of a file."""
     return {KIND: result.kind, FORMAT: VERSION, **result.attributes}
 
 
-def split(attributes: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+def kind_and_attributes(attributes: dict[str, Any]) -> tuple[str, dict[str, Any]]:
     """Return the kind and the attributes of a result from those of a file."""
-    kept = {
+    others = {
         key: value for key, value in attributes.items() if key not in (KIND, FORMAT)
     }
-    return str(attributes.get(KIND, "")), kept
+    return str(attributes.get(KIND, "")), others
 
 
 # Plain data, JSON and xarray
@@ -131,20 +139,26 @@ def to_dict(result: Result) -> dict[str, Any]:
         part = parts["coords" if variable.is_coordinate else "data_vars"]
         part[variable.name] = {
             "dims": list(variable.dims),
-            "attrs": facts(variable),
-            "data": plain(variable.values),
+            "attrs": variable_attributes(variable),
+            "data": plain_values(variable.values),
         }
     order = [variable.name for variable in flat(result)]
-    return {"attrs": about(result), "dims": result.sizes, **parts, "order": order}
+    return {
+        "attrs": file_attributes(result),
+        "dims": result.sizes,
+        **parts,
+        "order": order,
+    }
 
 
-def plain(values: np.ndarray) -> Any:
+def plain_values(values: np.ndarray) -> Any:
+    """Return values as nested lists, with None for those that are not finite."""
     if values.dtype.kind != "f":
         return values.tolist()
     return np.where(np.isfinite(values), values, None).tolist()
 
 
-def of_dict(data: dict[str, Any]) -> Result:
+def from_dict(data: dict[str, Any]) -> Result:
     """Return the result of `to_dict`."""
     variables = []
     parts = {**data["coords"], **data["data_vars"]}
@@ -154,8 +168,8 @@ def of_dict(data: dict[str, Any]) -> Result:
         if values.dtype == object:
             values = values.astype(float)
         variables.append(variable_of(name, tuple(part["dims"]), values, part["attrs"]))
-    kind, attributes = split(data["attrs"])
-    return joined(kind, variables, attributes)
+    kind, attributes = kind_and_attributes(data["attrs"])
+    return join_companions(kind, variables, attributes)
 
 
 def to_xarray(result: Result) -> Any:
@@ -168,12 +182,16 @@ def to_xarray(result: Result) -> Any:
         ) from None
     coordinates, variables = {}, {}
     for variable in flat(result):
-        array = (variable.dims, np.array(variable.values), facts(variable))
+        array = (
+            variable.dims,
+            np.array(variable.values),
+            variable_attributes(variable),
+        )
         if variable.is_coordinate:
             coordinates[variable.name] = array
         else:
             variables[variable.name] = array
-    return xarray.Dataset(variables, coordinates, about(result))
+    return xarray.Dataset(variables, coordinates, file_attributes(result))
 
 
 # Files
@@ -184,7 +202,7 @@ def write_netcdf(path: str | Path, result: Result) -> None:
 
     with atomic_file(path) as part, netcdf_file(part, "w", version=2) as file:
         order = " ".join(variable.name for variable in flat(result))
-        for key, value in {**about(result), ORDER: order}.items():
+        for key, value in {**file_attributes(result), ORDER: order}.items():
             if value != "":
                 setattr(file, key, encoded(value))
         for variable in flat(result):
@@ -195,11 +213,14 @@ def write_netcdf(path: str | Path, result: Result) -> None:
 
 
 def write_variable(file: Any, variable: Variable) -> None:
-    """Write a variable of an open NetCDF file; text is an array of bytes over one dimension more."""
-    dims, values = variable.dims, variable.values
+    """Write a variable of an open NetCDF file. Text becomes an array of bytes with one
+    more dimension."""
+    dims = variable.dims
+    values = variable.values
     code = "f8"
     if variable.is_text:
-        values, code = letters(values), "c"
+        values = letters(values)
+        code = "c"
         dims = (*dims, f"{variable.name}_length")
         file.createDimension(dims[-1], values.shape[-1])
     elif fits_integers(values):
@@ -208,7 +229,7 @@ def write_variable(file: Any, variable: Variable) -> None:
     stored[...] = values
     if variable.is_text:
         stored._Encoding = "utf-8"  # xarray reads text, not bytes
-    for key, text in facts(variable).items():
+    for key, text in variable_attributes(variable).items():
         setattr(stored, key, encoded(text))
 
 
@@ -220,13 +241,13 @@ def fits_integers(values: np.ndarray) -> bool:
 
 
 def encoded(value: Any) -> Any:
-    """Return an attribute as NetCDF has it: text in UTF-8, with bytes of file names that
-    are no text escaped."""
+    """Return an attribute as NetCDF has it. Text is in UTF-8; bytes of file names that
+    are no text are escaped."""
     if isinstance(value, str):
         return value.encode("utf-8", "backslashreplace")
     if isinstance(value, int):
         return np.int32(value)
-    # SciPy keeps but seven digits of a float of Python's.
+    # SciPy would write a Python float with seven digits.
     return np.float64(value)
 
 
@@ -244,22 +265,23 @@ def read_netcdf(path: str | Path) -> tuple[list[Variable], dict[str, Any]]:
     from scipy.io import netcdf_file
 
     with netcdf_file(path, "r", mmap=False) as file:
-        found = {key: decoded(value) for key, value in file._attributes.items()}
-        order = found.pop(ORDER, " ".join(file.variables)).split()
+        attributes = {key: decoded(value) for key, value in file._attributes.items()}
+        order = attributes.pop(ORDER, " ".join(file.variables)).split()
         variables = [read_variable(name, file.variables[name]) for name in order]
-    return variables, found
+    return variables, attributes
 
 
 def read_variable(name: str, stored: Any) -> Variable:
-    values, dims = stored.data, stored.dimensions
+    values = stored.data
+    dims = stored.dimensions
     if stored.typecode() == "c":
         words = np.ascontiguousarray(values).view(f"S{values.shape[-1]}")
         values = np.char.decode(words, "utf-8").reshape(values.shape[:-1])
         dims = dims[:-1]
     elif values.dtype.byteorder == ">":
         values = values.astype(values.dtype.newbyteorder("="))
-    facts = {key: decoded(value) for key, value in stored._attributes.items()}
-    return variable_of(name, tuple(dims), values, facts)
+    attributes = {key: decoded(value) for key, value in stored._attributes.items()}
+    return variable_of(name, tuple(dims), values, attributes)
 
 
 def decoded(value: Any) -> Any:
@@ -273,40 +295,41 @@ def write_json(path: Path, result: Result) -> None:
 
 
 def read_json(path: Path) -> Result:
-    return of_dict(json.loads(path.read_text(encoding="utf-8")))
+    return from_dict(json.loads(path.read_text(encoding="utf-8")))
 
 
 def columns(result: Result, dims: Sequence[str]) -> dict[str, np.ndarray]:
-    """Return the variables over some dimensions as columns by name, behind those of their
+    """Return the variables over ``dims`` as columns by name, after the columns of their
     coordinates."""
     dims = tuple(dims)
     shape = [result.sizes[dim] for dim in dims]
-    places = np.indices(shape).reshape(len(dims), -1)
-    found = {}
-    for dim, place in zip(dims, places):
-        found[dim] = place
+    indices = np.indices(shape).reshape(len(dims), -1)
+    values_by_name = {}
+    for dim, index in zip(dims, indices):
+        values_by_name[dim] = index
         if dim in result:
-            found[dim] = result[dim].values[place]
+            values_by_name[dim] = result[dim].values[index]
     for variable in flat(result):
         if variable.dims == dims and not variable.is_coordinate:
-            found[variable.name] = variable.values.ravel()
-    return found
+            values_by_name[variable.name] = variable.values.ravel()
+    return values_by_name
 
 
 def write_csv(path: Path, result: Result, dims: Sequence[str]) -> None:
-    """Write the variables over some dimensions as columns, with all digits."""
-    found = columns(result, dims)
-    count = max((len(values) for values in found.values()), default=0)
+    """Write the variables over ``dims`` as columns, with all digits."""
+    values_by_name = columns(result, dims)
+    count = max(map(len, values_by_name.values()), default=0)
     with (
         atomic_file(path) as part,
         part.open(
             "w", encoding="utf-8", errors="backslashreplace", newline="\n"
         ) as file,
     ):
-        file.write(",".join(found) + "\n")
+        file.write(",".join(values_by_name) + "\n")
         for start in range(0, count, ROWS_TOGETHER):
-            some = slice(start, start + ROWS_TOGETHER)
-            for row in zip(*(values[some].tolist() for values in found.values())):
+            batch = slice(start, start + ROWS_TOGETHER)
+            lists = [values[batch].tolist() for values in values_by_name.values()]
+            for row in zip(*lists):
                 file.write(",".join(map(cell, row)) + "\n")
 
 
@@ -315,25 +338,33 @@ def cell(value: Any) -> str:
 
 
 def read_csv(path: Path) -> Result:
-    """Return the columns of a table over its rows; units and coordinates are not in such a file."""
+    """Return the columns of a table over its rows. A CSV file has neither units nor
+    coordinates."""
     table = np.genfromtxt(
         path, delimiter=",", names=True, dtype=None, encoding="utf-8", ndmin=1
     )
     variables = [Variable(name, ("row",), table[name]) for name in table.dtype.names]
-    return joined("", variables, {})
+    return join_companions("", variables, {})
 
 
 def write_mat(path: Path, result: Result) -> None:
-    """Write variables under their names, and their dimensions, shapes and facts in a struct
-    ABOUT."""
+    """Write variables under their names, and the attributes, dimensions and shapes in a
+    struct ``geomech``."""
     from scipy.io import savemat
 
-    arrays, dims = {}, {}
+    arrays = {}
+    descriptions = {}
     for variable in flat(result):
         arrays[variable.name] = variable.values
-        known = {"dims": " ".join(variable.dims), "shape": variable.values.shape}
-        dims[variable.name] = {**known, **facts(variable)}
-    texts = {"about": json.dumps(about(result)), "variables": json.dumps(dims)}
+        descriptions[variable.name] = {
+            "dims": " ".join(variable.dims),
+            "shape": variable.values.shape,
+            **variable_attributes(variable),
+        }
+    texts = {
+        "about": json.dumps(file_attributes(result)),
+        "variables": json.dumps(descriptions),
+    }
     with atomic_file(path) as part:
         savemat(part, {**arrays, "geomech": texts}, long_field_names=True)
 
@@ -342,15 +373,15 @@ def read_mat(path: Path) -> Result:
     from scipy.io import loadmat
 
     file = loadmat(path, simplify_cells=True)
-    dims = json.loads(str(file["geomech"]["variables"]))
+    descriptions = json.loads(str(file["geomech"]["variables"]))
     variables = []
-    for name, known in dims.items():
-        over = tuple(known["dims"].split())
+    for name, description in descriptions.items():
+        dims = tuple(description["dims"].split())
         values = np.asarray(file[name])
         if values.dtype.kind == "U":
             values = np.char.rstrip(values)
         # MATLAB has no dimensions of length 1 at the end, and SciPy drops all of them.
-        shape = known.get("shape", values.shape or (1,) * len(over))
-        variables.append(variable_of(name, over, values.reshape(shape), known))
-    kind, attributes = split(json.loads(str(file["geomech"]["about"])))
-    return joined(kind, variables, attributes)
+        shape = description.get("shape", values.shape or (1,) * len(dims))
+        variables.append(variable_of(name, dims, values.reshape(shape), description))
+    kind, attributes = kind_and_attributes(json.loads(str(file["geomech"]["about"])))
+    return join_companions(kind, variables, attributes)

@@ -1,25 +1,27 @@
-"""Tables of numbers in text files, as instruments, trackers and spreadsheets write them.
+"""Tables of numbers in text files, as instruments, trackers and spreadsheets write
+them.
 
-One reader for all commands, in six steps:
+All commands use this reader. It works in six steps:
 
-    decode      UTF-8 or UTF-16, with or without a mark at the start, else Windows-1252
-    separator   of comma, semicolon, tab and blanks the one that parts the lines into
-                most cells with numbers
-    head        the header is the last line of words above the rows; what stands above
-                it is kept with the comments, as are texts after #
+    decode      UTF-8 or UTF-16, with or without a byte order mark, else Windows-1252
+    separator   comma, semicolon, tab or blanks: the one that splits the lines into most
+                cells with numbers
+    header      the last line of words above the rows; the lines above it, and texts
+                after #, are comments
     names       of columns, with a unit behind them: depth_mm, "Sinkage (mm)", F/N, or
                 in a line of units below
-    rows        lines below, without empty ones and a last one that is cut off
+    rows        lines below, without empty ones and an incomplete last one
     numbers     with a decimal comma where the separator leaves no doubt
 
-What is decided on the way is in ``notes``. `Rows.take` returns the columns that a
-reader wants, by `Column`, in its units.
+``notes`` tell what the reader decided for the user. `Rows.take` returns the columns
+that a caller asks for, by `Column`, in its units.
 """
 
 from __future__ import annotations
 
 import csv
 import hashlib
+import itertools
 import math
 import re
 import warnings
@@ -38,9 +40,10 @@ from rft.core.refusal import Refusal, formatted, located
 
 LARGEST_NUMBER = 1e12
 ENDINGS = (".csv", ".tsv", ".txt", ".dat")  # of the names of tables
-SAMPLE = 400  # lines that separator and header are looked for in
+SAMPLE_LINES = 400  # in which separator and header are looked for
 SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
-STACKED = ("scorer", "individuals", "bodyparts", "coords")  # DeepLabCut's header rows
+# First words of the header lines of DeepLabCut.
+DEEPLABCUT_WORDS = ("scorer", "individuals", "bodyparts", "coords")
 MISSING = ("", "nan", "na", "n/a", "none", "null", "-")  # of a cell without a number
 NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 WITH_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
@@ -65,16 +68,16 @@ UNITS: dict[str, dict[str, float]] = {  # by what is measured, in SI
     "stress per depth": {"N/cm3": 1e6, "N/m3": 1.0, "N/mm3": 1e9},
 }  # fmt: skip
 PIXELS = ("px", "pixel", "pixels")
-EPOCH = (9.4e8, 4.2e9)  # s since 1970, from 1999 to 2103: times within are such
+EPOCH = (9.4e8, 4.2e9)  # s since 1970 of the years 1999 to 2103
 
 
 class Column(NamedTuple):
-    """A column that a reader wants.
+    """A column that a caller asks for.
 
     name: as messages spell it, such as psi_deg. kind: of `UNITS`, "" for a number
-    without a unit. unit: in which the values are returned, and are where the header
-    names none. names: that it may have in a file without the unit, in small letters
-    with _ for blanks, the usual one first."""
+    without a unit. unit: of the values returned, and of the file's where the header
+    names none. names: that it may have in a file, without the unit, in lower case with
+    _ for blanks, the usual one first."""
 
     name: str
     kind: str = ""
@@ -82,22 +85,27 @@ class Column(NamedTuple):
     names: tuple[str, ...] = ()
 
     def matches(self, word: str) -> str | None:
-        """Return the unit that a header's word gives this column, "" for none, None if
-        it is the word of another column."""
-        if plain(word) in (self.name.lower(), *self.names):
-            return self.unit if plain(word) == self.name.lower() else ""
+        """Return the unit that a word of the header gives this column, "" for none;
+        None if it is the word of another column."""
+        name = plain(word)
+        if name == self.name.lower():
+            return self.unit
+        if name in self.names:
+            return ""
         bare, unit = split_unit(word)
         return unit if plain(bare) in self.names else None
 
-    def taken(self, word: str, unit: str) -> str:
-        """Return a note if a word has no unit where the column's usual name has one."""
+    def unit_note(self, word: str, unit: str) -> str:
+        """Return a note if a word has no unit where the column's usual name has one;
+        else ""."""
         if unit or not self.unit or split_unit(self.name)[1] != self.unit:
             return ""
         return f"{word} is taken to be in {self.unit}"
 
     def factor(self, word: str, unit: str) -> float:
-        """Return what one of a unit is in the column's own; Refusal for another kind."""
-        known = UNITS.get(self.kind, {})
+        """Return the factor from a unit of the file to the column's own; Refusal for a
+        unit of another kind."""
+        units = UNITS.get(self.kind, {})
         if unit == "":
             return 1.0
         if unit == "MN" and word.isupper():
@@ -105,19 +113,19 @@ class Column(NamedTuple):
                 f"column {word} may be in mN or in MN",
                 instead="write the unit as it is",
             )
-        if unit not in known:
-            raise Refusal(
-                f"column {word} is in {formatted(unit, 30)}",
-                instead=f"give it in {' or '.join([*known][:4])}"
-                if known
-                else "it has no unit here",
-            )
-        return known[unit] / known[self.unit]
+        if unit not in units:
+            cure = "it has no unit here"
+            if units:
+                cure = f"give it in {' or '.join([*units][:4])}"
+            raise Refusal(f"column {word} is in {formatted(unit, 30)}", instead=cure)
+        return units[unit] / units[self.unit]
 
 
-class Found(NamedTuple):
-    """Where a column is: its index and unit in the file, the factor to the unit that is
-    wanted, whether it is a time, and a note on what was taken for granted, or ""."""
+class ColumnPlace(NamedTuple):
+    """Where a column is in a file.
+
+    index: among the file's columns. unit: in the file. factor: to the unit that is
+    asked for. note: on what was assumed, or ""."""
 
     index: int
     unit: str
@@ -127,38 +135,44 @@ class Found(NamedTuple):
 
 
 def plain(word: str) -> str:
-    """Return a word in small letters with _ for blanks, dots and hyphens."""
+    """Return a word in lower case with _ for blanks, dots and hyphens."""
     return re.sub(r"[\s.\-]+", "_", word.strip().lower()).strip("_")
 
 
 def split_unit(word: str) -> tuple[str, str]:
-    """Return the name of a column and its unit: x_mm, "x mm", "x (mm)", "x [mm]", x/mm;
-    "" without one, as in names that no person writes."""
+    """Return the name of a column and its unit, "" without one: of x_mm, "x mm",
+    "x (mm)", "x [mm]" or x/mm."""
     word = word.strip()
-    if len(word) > LONGEST_NAME:  # the patterns below take its square in steps
+    # The time of the patterns below grows with the square of the length.
+    if len(word) > LONGEST_NAME:
         return word, ""
-    if match := re.fullmatch(r"(.+?)[\s_]*[(\[]\s*([^()\[\]]*?)\s*[)\]]", word):
+    match = re.fullmatch(r"(.+?)[\s_]*[(\[]\s*([^()\[\]]*?)\s*[)\]]", word)
+    if match:
         return match[1], unit_of(match[2]) or match[2]
     match = re.fullmatch(r"(.+?)(?:\s*/\s*|[\s_]+in[\s_]+|[\s_]+)([^\s_]+)", word)
-    unit = unit_of(match[2]) if match else ""
-    if match and unit:
-        return match[1], unit
+    if match:
+        unit = unit_of(match[2])
+        if unit:
+            return match[1], unit
     return word, ""
 
 
 def unit_of(text: str) -> str:
-    """Return a unit as `UNITS` spells it, px for pixels, BL for body lengths; "" for
-    what is none. Letters count as they stand, else in any size."""
+    """Return a unit as `UNITS` spells it, px for pixels, BL for body lengths; "" for a
+    text that is no unit. A unit in the wrong case is taken if none fits exactly."""
     text = re.sub(r"\^|\*\*|\s", "", text.strip(" ()[]"))
     text = text.translate({0xB5: "u", 0x3BC: "u", 0xB2: "2", 0xB3: "3"})
     if text.lower() in PIXELS:
         return "px"
     if text.lower() in ("bl", "body_lengths"):
         return "BL"
-    known = [unit for kind in UNITS.values() for unit in kind]
-    if text in known:
+    units = list(itertools.chain.from_iterable(UNITS.values()))
+    if text in units:
         return text
-    return next((unit for unit in known if unit.lower() == text.lower()), "")
+    for unit in units:
+        if unit.lower() == text.lower():
+            return unit
+    return ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +196,7 @@ class Rows:
 
     @property
     def header(self) -> tuple[int, tuple[str, ...]]:
-        """Line number and words of the header, in small letters."""
+        """Line number and words of the header, in lower case."""
         return self.line, tuple(word.lower() for word in self.words)
 
     @property
@@ -196,24 +210,26 @@ class Rows:
         return f"{self.name}, line {self.line}"
 
     @property
-    def found(self) -> str:
-        """What the header has, for a Refusal; "" for a file without rows of numbers,
-        whose first line may be nobody's business."""
-        if not any(self.number(x) is not None for x in self.first_cells()):
+    def header_text(self) -> str:
+        """The words of the header, for a Refusal. "" for a file without rows of
+        numbers: it may be any file, whose first line no message should show."""
+        if all(self.number(x) is None for x in self.first_cells()):
             return ""
         return f"it has {formatted(', '.join(self.words), 200)}"
 
     def first_cells(self) -> list[str]:
         """Return the cells of the first row; none without a row."""
-        return self.cells(self.rows[0][1]) if self.rows else []
+        if not self.rows:
+            return []
+        return self.cells(self.rows[0][1])
 
     def cells(self, text: str) -> list[str]:
         """Return the cells of a row, without blanks and quotes around them."""
         return split(text, self.separator)
 
     def number(self, cell: str) -> float | None:
-        """Return the number in a cell, None if it is none: digits in groups as 1_000
-        and digits of other scripts are none, nor are nan and inf."""
+        """Return the number in a cell, None if it is none. Digits in groups, as 1_000,
+        digits of other scripts, nan and inf are no numbers."""
         if self.decimal == ",":
             if "." in cell:
                 return None
@@ -230,16 +246,16 @@ class Rows:
         self, columns: Sequence[str], selected: Sequence[str] | None = None
     ) -> np.ndarray:
         """Return the numbers under the header (N, columns), or in ``selected`` columns;
-        Refusal naming the line of a row with anything else."""
-        selected = columns if selected is None else selected
-        picks = [[*columns].index(name) for name in selected]
-        return self._picked(picks)
+        Refusal with the line of a row that has anything else."""
+        names = columns if selected is None else selected
+        return self._numbers_at([[*columns].index(name) for name in names])
 
-    def _picked(self, picks: list[int]) -> np.ndarray:
-        values = [self._row(line, text, picks) for line, text in self.rows]
-        return np.array(values).reshape(-1, len(picks))
+    def _numbers_at(self, indices: list[int]) -> np.ndarray:
+        """Return the numbers (N, k) in k columns of the file."""
+        values = [self._row_at(line, text, indices) for line, text in self.rows]
+        return np.array(values).reshape(-1, len(indices))
 
-    def _row(self, line: int, text: str, picks: list[int]) -> list[float]:
+    def _row_at(self, line: int, text: str, indices: list[int]) -> list[float]:
         cells = self.cells(text)
         names = ",".join(self.words)
         expected = f"{len(self.words)} finite numbers ({names})"
@@ -247,7 +263,7 @@ class Rows:
         if len(cells) != len(self.words):
             raise Refusal(what, value=text[:40], where=f"{self.name}, line {line}")
         row = []
-        for k in picks:
+        for k in indices:
             number = self.number(cells[k])
             if number is None or abs(number) > LARGEST_NUMBER:
                 raise Refusal(
@@ -259,11 +275,28 @@ class Rows:
         return row
 
     def times(self, index: int, unit: str = "") -> tuple[np.ndarray, str]:
-        """Return the times (N,) of a column in s, and a note or "".
+        """Return the times (N,) of a column, s, and a note or "".
 
-        unit: as the header names it. Without one, times since 1970 are known by their
-        size. Those are counted from the first row, in whole numbers, as a float does
-        not hold ns since 1970."""
+        unit: that the header names, or "". Times since 1970 are recognised by their
+        size, and are counted from the first row."""
+        cells = self._time_cells(index)
+        word = self.words[index]
+        first = self.number(cells[0]) if cells else 0.0
+        epoch_unit = _unit_since_1970(first, unit)
+        if epoch_unit:
+            note = f"{word} is in {epoch_unit} since 1970, counted from the first row"
+            return self._since_first(cells) * UNITS["time"][epoch_unit], note
+        if first > LARGEST_NUMBER and not unit:
+            raise Refusal(
+                f"{word} is {first:g}, in no unit that is known",
+                where=f"{self.name}, line {self.lines[0]}",
+                instead=f"name it, for example {word}_ns",
+            )
+        values = np.array([self.number(cell) for cell in cells], float)
+        return values * UNITS["time"].get(unit, 1.0), ""
+
+    def _time_cells(self, index: int) -> list[str]:
+        """Return the cells of a column; Refusal for one that is no number."""
         cells = []
         for line, text in self.rows:
             row = self.cells(text)
@@ -275,108 +308,106 @@ class Rows:
                     instead="give the time in s as a number",
                 )
             cells.append(cell)
-        word = self.words[index]
-        first = self.number(cells[0]) if cells else 0.0
-        units = [unit] if unit else ["s", "ms", "us", "ns"]
-        since = [
-            x for x in units if EPOCH[0] < first * UNITS["time"].get(x, 0.0) < EPOCH[1]
-        ]
-        if not since:
-            if first > LARGEST_NUMBER and not unit:
-                raise Refusal(
-                    f"{word} is {first:g}, in no unit that is known",
-                    where=f"{self.name}, line {self.lines[0]}",
-                    instead=f"name it, for example {word}_ns",
-                )
-            values = np.array([self.number(cell) for cell in cells], float)
-            return values * UNITS["time"].get(unit, 1.0), ""
+        return cells
+
+    def _since_first(self, cells: list[str]) -> np.ndarray:
+        """Return numbers (N,) less the first of them."""
+        # Whole numbers are subtracted as such: a float cannot hold ns since 1970.
         if all(re.fullmatch("[0-9]+", cell) for cell in cells):
             start = int(cells[0])
-            values = np.array([int(cell) - start for cell in cells], float)
-        else:
-            values = np.array([self.number(cell) for cell in cells], float) - first
-        note = f"{word} is in {since[0]} since 1970, counted from the first row"
-        return values * UNITS["time"][since[0]], note
+            return np.array([int(cell) - start for cell in cells], float)
+        values = np.array([self.number(cell) for cell in cells], float)
+        return values - values[0]
 
     def find(
         self, columns: Sequence[Column], others: Sequence[Column] = ()
-    ) -> dict[str, Found]:
-        """Return where columns are, by name: ``columns``, which are needed, and those
-        of ``others`` that the file has. Refusal for a column that is missing, there
-        twice, or in a unit of another kind."""
-        found = {}
+    ) -> dict[str, ColumnPlace]:
+        """Return where columns are, by name: ``columns``, which are required, and those
+        of ``others`` that the file has. Refusal for a column that is missing, that
+        occurs twice, or that is in a unit of another kind."""
+        places = {}
         for column in (*columns, *others):
-            matches = []
-            for k, word in enumerate(self.words):
-                unit = column.matches(word)
-                if unit is not None:
-                    matches.append((k, unit))
-            if len(matches) > 1:
-                raise Refusal(
-                    f"the header has {len(matches)} columns {column.name}",
-                    where=self.place,
-                    because=self.found,
-                    instead="keep one",
-                )
-            if matches:
-                index, unit = matches[0]
-                with located(self.place):
-                    factor = column.factor(self.words[index], unit)
-                found[column.name] = Found(
-                    index,
-                    unit,
-                    factor,
-                    is_time=column.kind == "time",
-                    note=column.taken(self.words[index], unit),
-                )
+            place = self._place_of(column)
+            if place is not None:
+                places[column.name] = place
             elif column in columns:
-                needed = ",".join(x.name for x in columns)
+                required = ",".join(x.name for x in columns)
                 raise Refusal(
                     f"the header has no column {column.name}",
                     where=self.place,
-                    because=self.found,
-                    instead=f"it must have {needed}",
+                    because=self.header_text,
+                    instead=f"it must have {required}",
                 )
-        return found
+        return places
+
+    def _place_of(self, column: Column) -> ColumnPlace | None:
+        """Return where a column is, None if the file does not have it."""
+        matches = []
+        for k, word in enumerate(self.words):
+            unit = column.matches(word)
+            if unit is not None:
+                matches.append((k, unit))
+        if not matches:
+            return None
+        if len(matches) > 1:
+            raise Refusal(
+                f"the header has {len(matches)} columns {column.name}",
+                where=self.place,
+                because=self.header_text,
+                instead="keep one",
+            )
+        index, unit = matches[0]
+        word = self.words[index]
+        with located(self.place):
+            factor = column.factor(word, unit)
+        return ColumnPlace(
+            index,
+            unit,
+            factor,
+            is_time=column.kind == "time",
+            note=column.unit_note(word, unit),
+        )
 
     def take(
         self, columns: Sequence[Column], others: Sequence[Column] = ()
     ) -> dict[str, np.ndarray]:
         """Return the values (N,), by name, of the columns that `find` finds, in their
-        units, and note what was decided."""
-        found = self.find(columns, others)
-        values, notes = self.values(found)
-        self.tell(notes)
+        units, and issue a note of what was decided."""
+        values, notes = self.values(self.find(columns, others))
+        self.issue(notes)
         return values
 
     def values(
-        self, found: Mapping[str, Found]
+        self, places: Mapping[str, ColumnPlace]
     ) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
-        """Return the values (N,) of columns by name, and what was decided of them."""
-        notes = [*self.notes, *(x.note for x in found.values() if x.note)]
+        """Return the values (N,) of columns by name, and notes of what was decided."""
+        notes = [*self.notes, *(x.note for x in places.values() if x.note)]
         values = {}
-        picks = [x.index for x in found.values() if not x.is_time]
-        rest = iter(self._picked(picks).T)
-        for name, column in found.items():
-            if column.is_time:
-                values[name], note = self.times(column.index, column.unit)
-                notes += [note] if note else []
-            elif column.factor == 1.0:
-                values[name] = next(rest)
+        indices = [x.index for x in places.values() if not x.is_time]
+        numbers = iter(self._numbers_at(indices).T)
+        for name, place in places.items():
+            if place.is_time:
+                values[name], note = self.times(place.index, place.unit)
+                if note:
+                    notes.append(note)
+            elif place.factor == 1.0:
+                values[name] = next(numbers)
             else:
-                values[name] = next(rest) * column.factor
+                values[name] = next(numbers) * place.factor
         return values, tuple(notes)
 
-    def tell(self, notes: Sequence[str] | None = None) -> None:
-        """Warn in one `Note` of what was decided, by default ``self.notes``."""
+    def issue(self, notes: Sequence[str] | None = None) -> None:
+        """Warn (`Note`) of what was decided, in one line; by default of
+        ``self.notes``."""
         notes = self.notes if notes is None else notes
         if notes:
             warnings.warn(f"{self.name}: {'; '.join(notes)}", Note, stacklevel=4)
 
 
 def read(path: str | Path, largest: int, what: str) -> Rows:
-    """Return the table in a text file of at most ``largest`` bytes; Refusal with what
-    the file should be (``what``) if it is none."""
+    """Return the table in a text file of at most ``largest`` bytes. Refusal if it is
+    none. what: the cure of that refusal, the columns that the file should have."""
+    name = Path(path).name
     try:
         raw = files.read(path, largest)
     except (OSError, ValueError) as error:
@@ -386,33 +417,33 @@ def read(path: str | Path, largest: int, what: str) -> Rows:
             instead=what,
         ) from None
     refuse_foreign(path, raw)
-    text, notes = _decoded(raw)
+    text, notes = _decode(raw)
     if text is None:
         raise Refusal(
             f"cannot read {str(path)!r}", because="it is not text", instead=what
         )
-    filled, comments = _without_comments(text)
-    separator = _separator([line for _, line in filled[:SAMPLE]])
+    lines, comments = _without_comments(text)
+    separator = _separator([line for _, line in lines[:SAMPLE_LINES]])
     if separator != ",":
         notes.append(f"columns are parted by {SEPARATORS[separator]}")
-    nothing = separator + ' "\t'
-    filled = [(line, x) for line, x in filled if x.strip(nothing)]
-    with located(Path(path).name):
-        line, words, rows = _headed(filled, comments, separator, notes)
+    # A line of separators alone is empty.
+    lines = [(k, line) for k, line in lines if line.strip(separator + ' "\t')]
+    with located(name):
+        line, words, rows = _find_header(lines, comments, separator, notes)
     if line is None:
-        columns = len(split(filled[0][1], separator))
+        columns = len(split(lines[0][1], separator))
         raise Refusal(
             f"it has no header: its first line has {columns} numbers",
-            where=f"{Path(path).name}, line {filled[0][0]}",
+            where=f"{name}, line {lines[0][0]}",
             instead=f"put a line with the names of its {columns} columns above; {what}",
         )
     words, rows = _without_empty_column(words, rows, separator)
-    rows = _without_end(rows, len(words), separator, notes)
-    decimal = _decimal(rows, separator, Path(path).name)
+    rows = _without_cut_end(rows, len(words), separator, notes)
+    decimal = _decimal_mark(rows, separator, name)
     if decimal == ",":
         notes.append("numbers have decimal commas")
     return Rows(
-        Path(path).name,
+        name,
         hashlib.sha256(raw).hexdigest(),
         line,
         tuple(words),
@@ -427,25 +458,40 @@ def read(path: str | Path, largest: int, what: str) -> Rows:
 # The steps.
 
 
-def _decoded(raw: bytes) -> tuple[str | None, list[str]]:
-    """Return the text of a file with equal line ends, None if it has none, and notes.
+def _unit_since_1970(time: float, unit: str) -> str:
+    """Return the unit in which a time is likely since 1970: ``unit``, or one of several
+    if that is ""; "" if it is not since 1970."""
+    units = [unit] if unit else ["s", "ms", "us", "ns"]
+    for name in units:
+        if EPOCH[0] < time * UNITS["time"].get(name, 0.0) < EPOCH[1]:
+            return name
+    return ""
 
-    Excel writes UTF-16 with a mark at the start as "Unicode text", and Windows-1252 as
-    CSV; without a mark every second byte of UTF-16 is 0."""
-    notes = []
-    encoding = "utf-8-sig"
+
+def _encoding(raw: bytes) -> str:
+    """Return the likely encoding of a text, UTF-16 or UTF-8.
+
+    Excel writes UTF-16 with a byte order mark as "Unicode text". Without the mark every
+    second byte of UTF-16 is 0, as long as the letters are Latin."""
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        encoding = "utf-16"
-    elif len(raw) > 3 and not any(raw[1:200:2]) and all(raw[0:200:2]):
-        encoding = "utf-16-le"
-    elif len(raw) > 3 and not any(raw[0:200:2]) and all(raw[1:200:2]):
-        encoding = "utf-16-be"
+        return "utf-16"
+    if len(raw) > 3 and not any(raw[1:200:2]) and all(raw[0:200:2]):
+        return "utf-16-le"
+    if len(raw) > 3 and not any(raw[0:200:2]) and all(raw[1:200:2]):
+        return "utf-16-be"
+    return "utf-8-sig"
+
+
+def _decode(raw: bytes) -> tuple[str | None, list[str]]:
+    """Return the text of a file with line ends \\n, None if it has none, and notes."""
+    notes = []
+    encoding = _encoding(raw)
     try:
         text = raw.decode(encoding)
     except UnicodeDecodeError:
         if encoding != "utf-8-sig":
             return None, notes
-        encoding = "cp1252"
+        encoding = "cp1252"  # as Excel writes CSV
         text = raw.decode(encoding, "replace")
     if CONTROL.search(text):
         return None, notes
@@ -459,17 +505,17 @@ def _decoded(raw: bytes) -> tuple[str | None, list[str]]:
 def _without_comments(
     text: str,
 ) -> tuple[list[tuple[int, str]], list[tuple[int, str]]]:
-    """Return (line number, text) of the lines with something in them, and of the texts
+    """Return (line number, text) of the lines that are not empty, and of the texts
     after #."""
-    filled = []
+    lines = []
     comments = []
     for number, line in enumerate(text.split("\n"), 1):
         line, _, comment = line.partition("#")
         if line.strip():
-            filled.append((number, line.strip(" ")))
+            lines.append((number, line.strip(" ")))
         if comment.strip():
             comments.append((number, comment.strip()))
-    return filled, comments
+    return lines, comments
 
 
 def _with_points(comment: str, decimal: str) -> str:
@@ -480,13 +526,12 @@ def _with_points(comment: str, decimal: str) -> str:
 
 
 def split(text: str, separator: str) -> list[str]:
-    """Return the cells of a line, without blanks and quotes around them. Many blanks
-    part as one does, and none before a unit in parentheses."""
+    """Return the cells of a line, without blanks and quotes around them. Several blanks
+    count as one separator; a blank before a unit in parentheses is none."""
     if '"' in text:
+        reader = csv.reader([text], delimiter=separator, skipinitialspace=True)
         try:
-            cells = next(
-                csv.reader([text], delimiter=separator, skipinitialspace=True), []
-            )
+            cells = next(reader, [])
         except csv.Error:
             cells = text.split(separator)
     elif separator == " ":
@@ -497,94 +542,104 @@ def split(text: str, separator: str) -> list[str]:
 
 
 def _is_number(cell: str) -> bool:
-    """Return whether a cell looks like a number, with whatever decimal mark. A comma
-    in a cell is one of a number or a text, as those that part cells are gone."""
+    """Return whether a cell looks like a number, with any decimal mark."""
+    # A comma in a cell belongs to a number or a text: the line is split already.
     return any(form.fullmatch(cell) for form in (NUMBER, WITH_COMMA, THOUSANDS))
 
 
 def _separator(lines: list[str]) -> str:
-    """Return the separator that parts lines into most cells with numbers: those of the
-    lines with the number of cells that most lines have, which must be two or more."""
+    """Return the separator that splits lines into most cells with numbers. Only lines
+    with the usual number of cells count, which must be two or more."""
     best = ","
-    most = (0, 0)
-    is_parted = False  # all lines alike, by another one than blanks
+    highest = (0, 0)
+    is_split = False  # all lines into as many cells, by another separator than blanks
     for separator in SEPARATORS:
         rows = [split(line, separator) for line in lines]
         widths = Counter(len(row) for row in rows if len(row) > 1)
-        if not widths or (separator == " " and is_parted):
+        if not widths or (separator == " " and is_split):
             continue
         width, count = max(widths.items(), key=lambda item: (item[1], item[0]))
-        numbers = sum(
-            _is_number(cell) for row in rows if len(row) == width for cell in row
-        )
-        is_parted = is_parted or count == len(lines)
-        if (numbers, count) > most:
+        is_split = is_split or count == len(lines)
+        numbers = 0
+        for row in rows:
+            if len(row) == width:
+                numbers += sum(map(_is_number, row))
+        if (numbers, count) > highest:
             best = separator
-            most = (numbers, count)
+            highest = (numbers, count)
     return best
 
 
-def _headed(
-    filled: list[tuple[int, str]],
+def _find_header(
+    lines: list[tuple[int, str]],
     comments: list[tuple[int, str]],
     separator: str,
     notes: list[str],
 ) -> tuple[int | None, list[str], list[tuple[int, str]]]:
-    """Return line number and words of the header and the lines below it; None for the
-    line if there is no header. What is above it is added to the comments."""
-    if not filled:
+    """Return line number and words of the header, and the lines below it; None for the
+    line number if there is no header. Lines above it are added to the comments."""
+    if not lines:
         return 1, [""], []
-    cells = [split(text, separator) for _, text in filled[:SAMPLE]]
-    stacked = [k for k, row in enumerate(cells) if row[0].lower() in STACKED]
-    if stacked:
-        line, _ = filled[stacked[0]]
-        return line, cells[stacked[0]], filled[stacked[0] + 1 :]
-    body = _first_row(cells)
-    if body == 0:
-        return _commented(filled, comments, separator, notes)
-    above = range(len(cells) if body is None else body)
-    words = [k for k in above if len(cells[k]) > 1 and _is_words(cells[k])]
-    if body is None or not words:
-        head = 0
-    else:
-        head = words[-1]
+    cells = [split(text, separator) for _, text in lines[:SAMPLE_LINES]]
+    for k, row in enumerate(cells):
+        if row[0].lower() in DEEPLABCUT_WORDS:
+            return lines[k][0], row, lines[k + 1 :]
+    first_row = _first_row(cells)
+    if first_row == 0:
+        return _header_in_comment(lines, comments, separator, notes)
+
+    # The last line of words above the rows; without rows or such a line the first one.
+    words = []
+    if first_row is not None:
+        above = range(first_row)
+        words = [k for k in above if len(cells[k]) > 1 and _is_words(cells[k])]
+    head = words[-1] if words else 0
     below = head + 1
     units: list[str] = []
     if head > 0 and head - 1 in words and _is_units(cells[head]):
         units = cells[head]
         head -= 1
-    line = filled[head][0]
+    line, _ = lines[head]
     if head > 0:
         notes.append(f"the lines above line {line}, its header, are no rows")
-        comments[:0] = filled[:head]
+        comments[:0] = lines[:head]
     header = cells[head]
     if units and len(units) == len(header):
-        notes.append(f"line {filled[below - 1][0]} is one of units")
-        with located(f"line {filled[below - 1][0]}"):
-            header = [_with_unit(*both) for both in zip(header, units)]
-    if header and header[0].startswith("%"):  # of ROS
+        unit_line, _ = lines[below - 1]
+        notes.append(f"line {unit_line} is one of units")
+        with located(f"line {unit_line}"):
+            header = [_with_unit(word, unit) for word, unit in zip(header, units)]
+    # ROS writes a % before the header.
+    if header and header[0].startswith("%"):
         header = [header[0][1:].strip(), *header[1:]]
-    return line, header, filled[below:]
+    return line, header, lines[below:]
 
 
 def _first_row(cells: list[list[str]]) -> int | None:
-    """Return the index of the first line that has as many cells, and words in the same
-    ones, as most lines with numbers; None if no line has a number."""
-    kinds = []
-    for row in cells:
-        words = [
-            k
-            for k, cell in enumerate(row)
-            if cell.lower() not in MISSING and not _is_number(cell)
-        ]
-        has_number = any(_is_number(cell) for cell in row)
-        is_row = has_number and len(row) > 1
-        kinds.append((len(row), tuple(words)) if is_row else None)
+    """Return the index of the first row of a table: the first line of the kind that
+    most lines with numbers have. A kind is a number of cells, and which of them are
+    words. None if no line has a number."""
+    kinds = [_row_kind(row) for row in cells]
     counts = Counter(kind for kind in kinds if kind is not None)
     if not counts:
         return None
     usual = max(counts, key=lambda kind: counts[kind])
     return kinds.index(usual)
+
+
+def _row_kind(row: list[str]) -> tuple[int, tuple[int, ...]] | None:
+    """Return the number of cells of a line, and the indices of those with words; None
+    for a line that is no row of numbers."""
+    words = []
+    has_number = False
+    for k, cell in enumerate(row):
+        if _is_number(cell):
+            has_number = True
+        elif cell.lower() not in MISSING:
+            words.append(k)
+    if not has_number or len(row) < 2:
+        return None
+    return len(row), tuple(words)
 
 
 def _is_words(row: list[str]) -> bool:
@@ -595,56 +650,60 @@ def _is_words(row: list[str]) -> bool:
 def _is_units(row: list[str]) -> bool:
     """Return whether most words of a line are units."""
     words = [cell for cell in row if cell.strip("()[]- ")]
-    known = [cell for cell in words if unit_of(cell)]
-    return 2 * len(known) >= len(words) > 0
+    units = [cell for cell in words if unit_of(cell)]
+    return 2 * len(units) >= len(words) > 0
 
 
 def _with_unit(word: str, unit: str) -> str:
-    """Return the word of a header with the unit that stands below it; Refusal if it has
-    another one."""
+    """Return a word of the header with the unit that stands below it; Refusal if the
+    word has another unit."""
     unit = unit.strip("()[]- ")
-    own = split_unit(word)[1]
-    if own and unit_of(unit) not in ("", own):
+    _, unit_of_word = split_unit(word)
+    if unit_of_word and unit_of(unit) not in ("", unit_of_word):
         raise Refusal(f"{word} is in {unit} here", instead="keep one of the units")
-    if own or not unit:
+    if unit_of_word or not unit:
         return word
     return f"{word} ({unit})"
 
 
-def _commented(
-    filled: list[tuple[int, str]],
+def _header_in_comment(
+    lines: list[tuple[int, str]],
     comments: list[tuple[int, str]],
     separator: str,
     notes: list[str],
 ) -> tuple[int | None, list[str], list[tuple[int, str]]]:
-    """Return what `_headed` does for a file that begins with numbers: the comment
-    before them is the header if it has as many words, as numpy.savetxt writes it."""
-    width = len(split(filled[0][1], separator))
-    for line, text in reversed(comments):
-        if line < filled[0][0]:
-            words = split(text, separator)
-            if len(words) == width and _is_words(words):
-                notes.append(f"the comment in line {line} is its header")
-                comments.remove((line, text))
-                return line, words, filled
-            break
-    return None, [], filled
+    """Return the header and the lines, as `_find_header`, of a file that begins with
+    numbers. The last comment before them is the header if it has as many words, as
+    numpy.savetxt writes it."""
+    first_line, first_text = lines[0]
+    width = len(split(first_text, separator))
+    above = [comment for comment in comments if comment[0] < first_line]
+    if above:
+        line, text = above[-1]
+        words = split(text, separator)
+        if len(words) == width and _is_words(words):
+            notes.append(f"the comment in line {line} is its header")
+            comments.remove((line, text))
+            return line, words, lines
+    return None, [], lines
 
 
 def _without_empty_column(
     words: list[str], rows: list[tuple[int, str]], separator: str
 ) -> tuple[list[str], list[tuple[int, str]]]:
-    """Return header and rows without a last column in which nothing stands, as of lines
-    that end with a separator, or of LabVIEW's comments."""
+    """Return header and rows without an empty last column: lines may end with a
+    separator, or with LabVIEW's comments."""
     if len(words) > 2 and words[-1].lower() == "comment":
         widths = {len(split(text, separator)) for _, text in rows}
-        return (words[:-1], rows) if widths == {len(words) - 1} else (words, rows)
-    width = len(words) + bool(words[-1])
+        if widths == {len(words) - 1}:
+            return words[:-1], rows
+        return words, rows
+    # The header has the column as well, without a name, or ends before it.
+    width = len(words) + 1 if words[-1] else len(words)
     if separator == " " or not rows or width < 2:
         return words, rows
-    if not all(
-        text.rstrip().endswith(separator.strip() or separator) for _, text in rows
-    ):
+    ending = separator.strip() or separator
+    if not all(text.rstrip().endswith(ending) for _, text in rows):
         return words, rows
     if any(len(split(text, separator)) != width for _, text in rows):
         return words, rows
@@ -652,11 +711,11 @@ def _without_empty_column(
     return words[: width - 1], cut
 
 
-def _without_end(
+def _without_cut_end(
     rows: list[tuple[int, str]], width: int, separator: str, notes: list[str]
 ) -> list[tuple[int, str]]:
-    """Return the rows without lines of words at the end, and without a last row that is
-    cut off, where there are others."""
+    """Return the rows without lines of words at the end, and without an incomplete last
+    row, if complete rows remain."""
     end = len(rows)
     while end > 1:
         cells = split(rows[end - 1][1], separator)
@@ -664,22 +723,23 @@ def _without_end(
         if not is_cut and (len(cells) == width or any(_is_number(x) for x in cells)):
             break
         end -= 1
-    whole = [
-        k
-        for k, (_, text) in enumerate(rows[:end])
-        if len(split(text, separator)) == width
-    ][:1]
-    if end == len(rows) or not whole:
+    if end == len(rows):
         return rows
-    lines = " to ".join(dict.fromkeys(str(rows[k][0]) for k in (end, len(rows) - 1)))
+    if not any(len(split(text, separator)) == width for _, text in rows[:end]):
+        return rows
+    first = rows[end][0]
+    last = rows[-1][0]
+    lines = f"{first}" if first == last else f"{first} to {last}"
     notes.append(f"line {lines} at its end is no whole row, and is left out")
     return rows[:end]
 
 
-def _decimal(rows: list[tuple[int, str]], separator: str, name: str) -> str:
-    """Return the decimal mark. A comma is one where it parts no cells, or stands in
-    quotes, unless all may be groups of thousands; Refusal where these cannot be told
-    apart."""
+def _decimal_mark(rows: list[tuple[int, str]], separator: str, name: str) -> str:
+    """Return the decimal mark, "." or ",".
+
+    It is a comma where a number has one, and the comma is no separator or stands in
+    quotes. Refusal where all such numbers may have groups of thousands, as 1,234,
+    unless the separator is a semicolon."""
     thousands = None
     for line, text in rows:
         if "," not in text or (separator == "," and '"' not in text):
@@ -691,9 +751,8 @@ def _decimal(rows: list[tuple[int, str]], separator: str, name: str) -> str:
                 thousands = line, cell
     if thousands is None:
         return "."
-    if (
-        separator == ";"
-    ):  # where a comma is decimal: a spreadsheet writes ; for that reason
+    # Spreadsheets separate by semicolons where the comma is the decimal mark.
+    if separator == ";":
         return ","
     line, cell = thousands
     raise Refusal(

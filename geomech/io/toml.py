@@ -1,4 +1,4 @@
-"""Tables of TOML texts of other people, read within limits."""
+"""Tables of TOML texts from anywhere, read within limits."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 import tomllib
 from typing import Any
 
-MOST_PARTS = 64  # of a key with dots; Python's reader takes a time of their square
+MOST_PARTS = 64  # of a key with dots; the time to read it grows with their square
 PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 LONG_KEY = re.compile(rf"(?<![\w-]){PART}(?:[ \t]*+\.[ \t]*+{PART}){{{MOST_PARTS}}}")
 
@@ -20,8 +20,9 @@ def tables_of(text: str) -> dict[str, Any]:
     >>> tables_of("gait.kind = 'circle'")
     {'gait': {'kind': 'circle'}}
     """
-    if long := LONG_KEY.search(text):
-        line = 1 + text.count("\n", 0, long.start())
+    long_key = LONG_KEY.search(text)
+    if long_key:
+        line = 1 + text.count("\n", 0, long_key.start())
         raise ValueError(f"a key has more than {MOST_PARTS} parts (at line {line})")
     try:
         return tomllib.loads(text)

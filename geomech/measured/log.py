@@ -139,7 +139,7 @@ def _read(source: Rows, picked: tuple[str, ...], degrees: bool) -> Log:
     alpha = rows[:, :-3] * turns[:-1]
     xy = rows[:, -3:-1] * size
     heading = rows[:, -1] * turns[-1]
-    source.tell(notes)
+    source.issue(notes)
     return Log(
         source.name,
         t,

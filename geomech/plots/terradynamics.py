@@ -118,14 +118,14 @@ def intrusion_figure(scene: Any, result: Any) -> Any:
     fig, axes = figure(10.2, 3.2, 3)
     columns = {name: v.values for name, v in result.items() if v.dims == ("t",)}
     if hasattr(scene, "mesh"):
-        from geomech.scenes.solid import Passed
+        from geomech.scenes.solid import MeshIntrusion
 
         force = np.stack([columns[f"force_{axis}"] for axis in "xyz"], -1)
         step = int(np.linalg.norm(force, axis=-1).argmax())
         axes[0, 0].remove()
         ax = fig.add_subplot(1, 3, 1, projection="3d")
         trajectory = scene.motion.trajectory(scene.mesh)
-        run = Passed(trajectory, force, columns["moment"], columns["power"])
+        run = MeshIntrusion(trajectory, force, columns["moment"], columns["power"])
         draw_stress(ax, *scene.faces(run, step))
         title = f"where the force is largest, t = {columns['t'][step]:.3g} s"
         ax.set_title(title, fontsize=8)

@@ -67,8 +67,8 @@ def read_netcdf(path: Path) -> Result:
     variables, attributes = io.read_netcdf(path)
     if io.FORMAT not in attributes:
         variables = translated(variables)
-    kind, facts = io.split(attributes)
-    return io.joined(kind, variables, facts)
+    kind, facts = io.kind_and_attributes(attributes)
+    return io.join_companions(kind, variables, facts)
 
 
 WRITERS: dict[str, Callable] = {

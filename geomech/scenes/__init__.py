@@ -1,4 +1,5 @@
-"""Scenes: what is simulated and how finely. `load` reads one by its name or from a TOML file, `write` gives its TOML."""
+"""Scenes: what is simulated, and how finely. `load` reads one by its name or from a
+TOML file, `toml` returns its text."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING
@@ -23,11 +24,25 @@ if TYPE_CHECKING:
     from geomech.scenes.walker import WalkerScene
 
 __all__ = [
-    "IntruderScene", "Intruding", "MeshScene", "Numerics", "Scene", "WalkerScene", "builtin_names", "from_tables", "in_medium",
-    "inputs", "intruder_names", "load", "parse", "tables", "toml", "walker_names",
-]  # fmt: skip
+    "IntruderScene",
+    "Intruding",
+    "MeshScene",
+    "Numerics",
+    "Scene",
+    "WalkerScene",
+    "builtin_names",
+    "from_tables",
+    "in_medium",
+    "inputs",
+    "intruder_names",
+    "load",
+    "parse",
+    "tables",
+    "toml",
+    "walker_names",
+]
 
-_OTHER = {
+_MODULES = {  # of scenes without a gait, by class
     "IntruderScene": "intruder",
     "Intruding": "intruding",
     "MeshScene": "solid",
@@ -36,13 +51,13 @@ _OTHER = {
 
 
 def __getattr__(name: str) -> type:
-    """Return a class of scenes without a gait; its mechanics takes as long to load as that of all others, and is loaded
-    here."""
-    if name not in _OTHER:
+    """Return a class of scenes without a gait."""
+    # Its mechanics takes as long to import as that of all other scenes together, so it
+    # is imported when first used.
+    if name not in _MODULES:
         raise AttributeError(f"module 'geomech.scenes' has no attribute {name!r}")
-    globals()[name] = kind = getattr(
-        import_module(f"geomech.scenes.{_OTHER[name]}"), name
-    )
+    kind = getattr(import_module(f"geomech.scenes.{_MODULES[name]}"), name)
+    globals()[name] = kind
     return kind
 
 

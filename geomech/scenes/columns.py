@@ -1,4 +1,4 @@
-"""Columns of numbers that a scene takes from CSV files, whatever their order."""
+"""Columns of numbers that a scene takes from CSV files, in any order."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from geomech.io.rows import Column
 from rft.core.refusal import Refusal, formatted, located
 
 LARGEST_FILE = 20_000_000  # bytes
-KINDS = {  # of columns by their names, with the unit that a scene has them in
+KINDS = {  # of columns, with their units in a scene, by name
     "t": ("time", "s"),
     "x": ("length", "m"),
     "y": ("length", "m"),
@@ -30,7 +30,7 @@ OTHER_NAMES = {"t": ("t", "time")}
 
 
 def column(name: str) -> Column:
-    """Return the column of a name in `KINDS`."""
+    """Return the column of `KINDS` with a name."""
     kind, unit = KINDS[name]
     return Column(name, kind, unit, OTHER_NAMES.get(name, (name,)))
 
@@ -38,44 +38,43 @@ def column(name: str) -> Column:
 def columns(
     place: str, path, required: tuple[str, ...], optional: tuple[str, ...] = ()
 ) -> dict[str, np.ndarray]:
-    """Return the columns ``required``, and those of ``optional`` that the file has, in
-    the units of `KINDS`. Refusal, with ``place`` and the line, for any other file."""
+    """Return the columns ``required`` (N,), and those of ``optional`` that the file
+    has, by name, in the units of `KINDS`. Refusal, with ``place`` and the line, for any
+    other file."""
     if not isinstance(path, (str, Path)):
         raise Refusal("file must be the name of a CSV file", value=path, where=place)
     header = ",".join(required)
-    needed = [column(name) for name in required]
-    wanted = [column(name) for name in optional]
+    accepted = [column(name) for name in (*required, *optional)]
     with located(place):
         source = rows.read(
             path, LARGEST_FILE, f"give a CSV file with the header {header}"
         )
-        found = source.find((), [*needed, *wanted])
-        used = {x.index for x in found.values()}
+        places = source.find((), accepted)
+        used = {x.index for x in places.values()}
         unknown = [x for k, x in enumerate(source.words) if k not in used]
-        if unknown or not {*required} <= {*found}:
-            more = f", and {','.join(optional)} if wanted" if optional else ""
-            because = source.found
+        if unknown or not {*required} <= {*places}:
+            what = f"the header must be {header}"
+            if optional:
+                what += f", and {','.join(optional)} if wanted"
+            because = source.header_text
             if unknown and because:
-                because = (
-                    f"{because}, of which {formatted(unknown[0])} is none of these"
-                )
-            raise Refusal(
-                f"the header must be {header}{more}",
-                where=source.place,
-                because=because,
-            )
-        values, notes = source.values(found)
-        source.tell(notes)
+                because += f", of which {formatted(unknown[0])} is none of these"
+            raise Refusal(what, where=source.place, because=because)
+        values, notes = source.values(places)
+        source.issue(notes)
     return {name: values[name] for name in (*required, *optional) if name in values}
 
 
 def columns_reader(
     required: tuple[str, ...], optional: tuple[str, ...] = ()
 ) -> Callable[[str, str], dict[str, list]]:
-    """Return a function (place, file) that reads a column of a CSV file for each key."""
-    return lambda place, file: {
-        key: x.tolist() for key, x in columns(place, file, required, optional).items()
-    }
+    """Return a function (place, file) that reads a CSV file with a column per key."""
+
+    def read(place: str, file: str) -> dict[str, list]:
+        values = columns(place, file, required, optional)
+        return {key: x.tolist() for key, x in values.items()}
+
+    return read
 
 
 def rows_reader(
@@ -83,6 +82,9 @@ def rows_reader(
 ) -> Callable[[str, str], dict[str, list]]:
     """Return a function (place, file) that reads columns of a CSV file as the rows of
     one key."""
-    return lambda place, file: {
-        key: np.stack([*columns(place, file, required).values()], -1).tolist()
-    }
+
+    def read(place: str, file: str) -> dict[str, list]:
+        values = columns(place, file, required)
+        return {key: np.stack([*values.values()], -1).tolist()}
+
+    return read

@@ -1,4 +1,4 @@
-"""Frames that are computed for a scene: they depend on its numerics."""
+"""The minimum-perturbation frame of a scene, which depends on its numerics."""
 
 from __future__ import annotations
 
@@ -12,18 +12,21 @@ from rft.core.refusal import Refusal
 
 
 def framed(system: System, numerics: Numerics) -> System:
-    """Return a system in its minimum-perturbation frame, on the grid of the numerics; the same object where these
-    change nothing."""
+    """Return a system in its minimum-perturbation frame, on the grid of the numerics;
+    the same object where its frame is this one already. Refusal for a grid that is too
+    large."""
     if isinstance(system, Table):
         return system.in_frame(NAME)  # on the grid of its file
     inner = system.inner if isinstance(system, Framed) else system
-    if (count := numerics.grid**inner.joints) > LARGEST_GRID or (
-        inner.joints > 3 and count > LARGEST_FIELD
-    ):
+    shapes = numerics.grid**inner.joints
+    largest = LARGEST_GRID
+    if inner.joints > 3:
+        largest = min(LARGEST_GRID, LARGEST_FIELD)
+    if shapes > largest:
         raise Refusal(
             f"a frame on a grid of {numerics.grid}^{inner.joints} shapes is too large",
-            instead="lower [numerics] grid, or take a body of two shape variables, such as a chain with "
-            "[body] modes or a serpenoid",
+            instead="lower [numerics] grid, or take a body of two shape variables, "
+            "such as a chain with [body] modes or a serpenoid",
         )
     axes = connection.grid(inner.joints, numerics.grid, numerics.extent)
     grid = tuple(tuple(a.tolist()) for a in axes)
@@ -32,5 +35,8 @@ def framed(system: System, numerics: Numerics) -> System:
 
 
 def reframed(system: System, numerics: Numerics) -> System:
-    """Return a system whose frame depends on the numerics, computed with these; any other unchanged."""
-    return framed(system, numerics) if isinstance(system, Framed) else system
+    """Return a system whose frame depends on numerics with the frame of these; any
+    other system unchanged."""
+    if isinstance(system, Framed):
+        return framed(system, numerics)
+    return system

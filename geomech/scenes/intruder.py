@@ -1,4 +1,5 @@
-"""Intruder scenes: a body of given outline that moves in a given way through the vertical plane."""
+"""Intruder scenes: a body with an outline that moves through the vertical plane in a
+prescribed way."""
 
 from __future__ import annotations
 
@@ -34,17 +35,22 @@ POINTS = FromFile(
 )
 COURSE = FromFile(
     columns_reader(("t", "x", "z"), ("angle",)),
-    "CSV with the header t,x,z or t,x,z,angle (s, m, rad); velocities are differences of order 2 in the spacing of t",
+    "CSV with the header t,x,z or t,x,z,angle (s, m, rad); velocities are differences "
+    "of order 2 in the spacing of t",
 )
-ELEMENTS = "of the outline, about, 1 to 5000; the error is of order 2 in their number, 1 with tension cut"
+ELEMENTS = (
+    "of the outline, about, 1 to 5000; the error is of order 2 in their number, 1 with "
+    "tension cut"
+)
 OUTLINES = OneOf(SHAPES, files={"polygon": POINTS, "spline": POINTS})
 
 
 class Intrusion(NamedTuple):
-    """Forces along a motion. t (T,) s; pose and twist (T, 3) as
-    `rft.terradynamics.plates.loads` has them; force (T, 2) N; moment (T,) N m about the
-    frame's origin; power (T,) W of the grains on the body. With effects that have a
-    weight the force is that of both."""
+    """Forces along a motion.
+
+    t: (T,), s. pose, twist: (T, 3), as for `rft.terradynamics.plates.loads`. force:
+    (T, 2), N, with the weights of effects. moment: (T,), N m, about the frame's origin.
+    power: (T,), W, of the grains on the body."""
 
     t: np.ndarray
     pose: np.ndarray
@@ -54,15 +60,20 @@ class Intrusion(NamedTuple):
     power: np.ndarray
 
     def __repr__(self) -> str:
-        (x, z), span = self.force.T, summary.span
-        forces = f"force x {span(x)} N, z {span(z)} N; moment {span(self.moment)} N m; power {span(self.power)} W"
-        return f"Intrusion({len(self.t)} poses, t {span(self.t)} s; {forces})"
+        span = summary.span
+        x, z = self.force.T
+        described = (
+            f"force x {span(x)} N, z {span(z)} N; moment {span(self.moment)} N m; "
+            f"power {span(self.power)} W"
+        )
+        return f"Intrusion({len(self.t)} poses, t {span(self.t)} s; {described})"
 
 
 @dataclass(frozen=True)
 class IntruderScene(Intruding):
-    """A stress map, a body and its motion, and effects. elements: of the outline. files: those that the scene names. text: its
-    TOML.
+    """A stress map, a body and its motion, and effects.
+
+    elements: of the outline. files: that the scene names. text: its TOML.
 
     Examples
     --------
@@ -117,23 +128,28 @@ class IntruderScene(Intruding):
 
     @property
     def per_part(self) -> float:
-        return 6e-8 * (
-            2 if self.medium.tension == "cut" and not self.outline.closed else 1
-        )
+        seconds = 6e-8
+        if self.medium.tension == "cut" and not self.outline.closed:
+            return 2 * seconds
+        return seconds
 
     @property
     def finer(self) -> tuple[int, ...]:
-        """Factors of refinement. Of first order also three, because the change by one factor alone may be small by
-        chance."""
-        return (2,) if self.order == 2 else (2, 3)
+        """Factors of refinement."""
+        if self.order == 2:
+            return (2,)
+        # Of first order the change by one factor alone may be small by chance.
+        return (2, 3)
 
     @property
     def order(self) -> int:
         return ORDER[self.medium.tension]
 
     def run(self, elements: int | None = None) -> Intrusion:
-        """Return forces along the motion, with the scene's number of elements or another."""
-        outline = self.outline if elements is None else self.intruder.outline(elements)
+        """Return forces along the motion. elements: in place of the scene's."""
+        outline = self.outline
+        if elements is not None:
+            outline = self.intruder.outline(elements)
         t, pose, twist = self.motion.trajectory(outline)
         result: Loads = loads(self.medium, outline, pose, twist, self.effects)
         return Intrusion(
@@ -146,12 +162,15 @@ class IntruderScene(Intruding):
         )
 
     def table(self, result: Intrusion) -> dict[str, np.ndarray]:
-        """Return the columns of a result: t, angle (or x and z, if the body does not turn about a hub), force_x,
-        force_z, moment."""
-        place = (
-            {"angle": result.pose[:, 2]}
-            if self.motion.turns
-            else {"x": result.pose[:, 0], "z": result.pose[:, 1]}
-        )
-        force = {"force_x": result.force[:, 0], "force_z": result.force[:, 1]}
-        return {"t": result.t, **place, **force, "moment": result.moment}
+        """Return the columns of a result: t; angle, or x and z if the body does not
+        turn about a hub; force_x, force_z, moment."""
+        columns = {"t": result.t}
+        if self.motion.turns:
+            columns["angle"] = result.pose[:, 2]
+        else:
+            columns["x"] = result.pose[:, 0]
+            columns["z"] = result.pose[:, 1]
+        columns["force_x"] = result.force[:, 0]
+        columns["force_z"] = result.force[:, 1]
+        columns["moment"] = result.moment
+        return columns

@@ -1,4 +1,5 @@
-"""The base of scenes of bodies that move through grains in a prescribed way, of outlines and of meshes."""
+"""The base of scenes of bodies, outlines or meshes, that move through grains in a
+prescribed way."""
 
 from __future__ import annotations
 
@@ -14,8 +15,11 @@ from rft.terradynamics.ground import GroundEffect, checked_effects, weight
 
 
 class Intruding:
-    """Base of such scenes. parts: name of the body's parts, in the plural. finer: factors of refinement that yield the
-    error. field_types: {field: (class, what to give instead)}. per_part: s for a part at a pose, measured."""
+    """A scene of a body that moves through grains in a prescribed way.
+
+    parts: name of the body's parts, in the plural. finer: factors of refinement that
+    yield the error. field_types: {field: (class, what to give instead)}. per_part: s
+    for a part at a pose, measured."""
 
     parts = "parts"
     finer: tuple[int, ...] = (2,)
@@ -28,19 +32,14 @@ class Intruding:
     files: tuple[str, ...]
 
     def _check(self) -> None:
-        """Raise Refusal for fields of wrong types."""
-        for name, (kind, example) in {
-            **self.field_types,
-            "name": (str, "text"),
-            "text": (str, "text"),
-        }.items():
-            if not isinstance(getattr(self, name), kind):
-                raise Refusal(f"{name} must be {example}", value=getattr(self, name))
-        if not (
-            isinstance(self.files, tuple)
-            and all(isinstance(x, str) for x in self.files)
-        ):
-            raise Refusal("files must be a tuple of names", value=self.files)
+        """Raise Refusal for fields of wrong types, and check the effects."""
+        text = (str, "text")
+        field_types = {**self.field_types, "name": text, "text": text}
+        for name, (kind, example) in field_types.items():
+            value = getattr(self, name)
+            if not isinstance(value, kind):
+                raise Refusal(f"{name} must be {example}", value=value)
+        check_files(self.files)
         check_numbers(self)
         with located("[[effects]]"):
             object.__setattr__(self, "effects", checked_effects(self.effects))
@@ -74,8 +73,18 @@ class Intruding:
         return dataclasses.replace(self, **parts)
 
     def weighed(self, force: np.ndarray) -> np.ndarray:
-        """Return forces (T, k) along x, (y,) z with those of effects that are not the grains'."""
+        """Return forces (T, 2 or 3), N, with the weights of effects. Their columns are
+        x and z, or x, y and z."""
         x, z = weight(self.effects)
         if not (x or z):
             return force
-        return force + np.array([x, *[0.0] * (force.shape[1] - 2), z])
+        added = np.zeros(force.shape[1])
+        added[0] = x
+        added[-1] = z
+        return force + added
+
+
+def check_files(files: Any) -> None:
+    """Raise Refusal unless the files of a scene are a tuple of names."""
+    if not isinstance(files, tuple) or not all(isinstance(x, str) for x in files):
+        raise Refusal("files must be a tuple of names", value=files)

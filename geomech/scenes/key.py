@@ -1,9 +1,10 @@
 """Keys of a section of a scene file, from the class that the section is read into.
 
-A class declares them in the annotations of its fields (`rft.core.checks.Number`, `Word`), else in its docstring: ``name
-(unit): meaning``, or ``name, other (unit): meaning``, up to the next key or the end of the paragraph. The unit is -
-where there is none; a key in rad may be given in degrees, as ``name_deg``. Types and defaults are those of its
-fields.
+A class declares them in the annotations of its fields (`rft.core.checks.Number`,
+`Word`), else in its docstring, as ``name (unit): meaning`` or ``name, other (unit):
+meaning``, up to the next key or the end of the paragraph. The unit is - where there is
+none. A key in rad may be given in degrees, as ``name_deg``. Types and defaults are
+those of the fields.
 """
 
 from __future__ import annotations
@@ -24,15 +25,18 @@ MARK = re.compile(r"(?<![\w`.])((?:[A-Za-z_]\w*, )*[A-Za-z_]\w*) \(([^()]*)\):\s
 
 
 class Word(NamedTuple):
-    """A field whose text is one of several choices. meaning: for lists of keys."""
+    """The annotation of a field whose text is one of several choices. meaning: for
+    lists of keys."""
 
     choices: Collection[str]
     meaning: str
 
 
 class Key(NamedTuple):
-    """One key of a section. schema: JSON Schema of its values. default: None where it has no value by default. degrees:
-    it may be given as ``name``_deg. alias: another name of it."""
+    """One key of a section.
+
+    schema: JSON Schema of its values. default: None where there is none. degrees:
+    whether it may also be given as ``name``_deg. alias: another name of it."""
 
     name: str
     schema: dict[str, Any]
@@ -45,21 +49,22 @@ class Key(NamedTuple):
 
     @property
     def value(self) -> str:
-        """The default as a scene file has it."""
+        """The default as a scene file has it; or "required", or "none"."""
         if self.required:
             return "required"
-        return (
-            "none" if self.default is None else json.dumps(self.default, default=list)
-        )
+        if self.default is None:
+            return "none"
+        return json.dumps(self.default, default=list)
 
     @property
     def spellings(self) -> tuple[str, ...]:
         """The names under which a file may give it."""
-        return (
-            self.name,
-            *[f"{self.name}_deg"] * self.degrees,
-            *[self.alias] * bool(self.alias),
-        )
+        names = [self.name]
+        if self.degrees:
+            names.append(f"{self.name}_deg")
+        if self.alias:
+            names.append(self.alias)
+        return tuple(names)
 
 
 def text_key(name: str, meaning: str, required: bool = False) -> Key:
@@ -69,70 +74,71 @@ def text_key(name: str, meaning: str, required: bool = False) -> Key:
 
 def keys_of(kind: type) -> list[Key]:
     """Return the keys of a section that a class is read from."""
-    schemas, names, words, numbers = (
-        _schemas(kind),
-        aliases(kind),
-        words_of(kind),
-        number_fields(kind),
+    schemas = _schemas(kind)
+    return [_key_of(kind, field, schemas) for field in key_fields(kind)]
+
+
+def key_fields(kind: type) -> list[dataclasses.Field]:
+    """Return the fields of a class that are keys of its section."""
+    fields = dataclasses.fields(kind)
+    return [field for field in fields if field.init and field.name != "solver"]
+
+
+def _key_of(kind: type, field: dataclasses.Field, schemas: dict[str, dict]) -> Key:
+    name = field.name
+    required = field.default is field.default_factory is dataclasses.MISSING
+    required = required or name in getattr(kind, "required", ())
+    schema = _plain_schema(schemas.get(name, {}))
+    unit, meaning = meanings(kind).get(name, ("", ""))
+    number = number_fields(kind).get(name)
+    if number:
+        schema = schema | {"minimum": number.low, "maximum": number.high}
+    word = words_of(kind).get(name)
+    if word:
+        schema = schema | {"enum": [*word.choices]}
+        unit = "-"
+        meaning = word.meaning
+    name_in_file = aliases(kind).get(name, name)
+    return Key(
+        name_in_file,
+        schema,
+        unit,
+        meaning,
+        required,
+        default=None if required else _default(field),
+        degrees=name in angles_of(kind),
+        alias=name if name_in_file != name else "",
     )
-    keys = []
-    for field in dataclasses.fields(kind):
-        if field.init and field.name != "solver":
-            required = field.default is field.default_factory is dataclasses.MISSING
-            required = required or field.name in getattr(kind, "required", ())
-            default = None if required else _default(field)
-            schema, (unit, meaning) = (
-                _plain(schemas.get(field.name, {})),
-                meanings(kind).get(field.name, ("", "")),
-            )
-            if number := numbers.get(field.name):
-                schema = schema | {"minimum": number.low, "maximum": number.high}
-            if word := words.get(field.name):
-                schema, unit, meaning = (
-                    schema | {"enum": [*word.choices]},
-                    "-",
-                    word.meaning,
-                )
-            name, alias = (
-                (names[field.name], field.name)
-                if field.name in names
-                else (field.name, "")
-            )
-            degrees = field.name in angles_of(kind)
-            keys.append(
-                Key(name, schema, unit, meaning, required, default, degrees, alias)
-            )
-    return keys
 
 
 def aliases(kind: type) -> Mapping[str, str]:
-    """Return, by field, the names in files of keys that are no names in Python."""
+    """Return the names in files of fields whose keys are no names in Python, by
+    field."""
     return getattr(kind, "aliases", {})
 
 
 @functools.cache
 def angles_of(kind: type) -> frozenset[str]:
-    """Return the fields in rad, which a file may give in degrees; none for a class that is no dataclass."""
+    """Return the names of the fields in rad, which a file may give in degrees; none for
+    a class that is no dataclass."""
     if not dataclasses.is_dataclass(kind):
         return frozenset()
-    return frozenset(
-        name for name, (unit, _) in meanings(kind).items() if unit == "rad"
-    )
+    units = {name: unit for name, (unit, _) in meanings(kind).items()}
+    return frozenset(name for name, unit in units.items() if unit == "rad")
 
 
 @functools.cache
 def spellings(kind: type) -> dict[str, tuple[str, bool]]:
-    """Return, by key in a file, the field of a class and whether it is in degrees."""
-    names = [
-        field.name
-        for field in dataclasses.fields(kind)
-        if field.init and field.name != "solver"
-    ]
+    """Return the field of a class, and whether the key is in degrees, by key in a
+    file."""
+    names = [field.name for field in key_fields(kind)]
     fields = {name: (name, False) for name in names}
-    fields |= {spelling: (name, False) for name, spelling in aliases(kind).items()}
-    return fields | {
-        f"{name}_deg": (name, True) for name in names if name in angles_of(kind)
-    }
+    for name, name_in_file in aliases(kind).items():
+        fields[name_in_file] = (name, False)
+    for name in names:
+        if name in angles_of(kind):
+            fields[f"{name}_deg"] = (name, True)
+    return fields
 
 
 @functools.cache
@@ -140,80 +146,76 @@ def words_of(kind: type) -> dict[str, Word]:
     """Return the annotations `Word` of a class by field."""
     try:
         hints = get_type_hints(kind, include_extras=True)
-    except (
-        NameError,
-        TypeError,
-    ):  # of a class of a user's, whose annotations name what is not there
+    except (NameError, TypeError):
+        # The annotations of a custom class may name types that are not imported.
         return {}
-    marked = {
-        name: [x for x in get_args(hint) if isinstance(x, Word)]
-        for name, hint in hints.items()
-    }
-    return {name: words[0] for name, words in marked.items() if words}
+    words = {}
+    for name, hint in hints.items():
+        for annotation in get_args(hint):
+            if isinstance(annotation, Word):
+                words[name] = annotation
+                break
+    return words
 
 
 def _schemas(kind: type) -> dict[str, dict]:
-    """Return JSON Schema of the fields; empty for types that no scene file can hold, and for a custom class with
-    such."""
+    """Return JSON Schema of the fields by name. A type that no scene file can hold is
+    an object; {} for a custom class of which there is no schema."""
     try:
-        return msgspec.json.schema(kind, schema_hook=lambda other: {"type": "object"})[
-            "$defs"
-        ][kind.__name__]["properties"]
+        schema = msgspec.json.schema(kind, schema_hook=lambda _: {"type": "object"})
+        return schema["$defs"][kind.__name__]["properties"]
     except (TypeError, KeyError):
         return {}
 
 
-def _plain(schema: dict) -> dict[str, Any]:
+def _plain_schema(schema: dict) -> dict[str, Any]:
     """Return a schema without default, and without null, which TOML lacks."""
     values = [x for x in schema.get("anyOf", ()) if x.get("type") != "null"]
-    return (
-        values[0]
-        if len(values) == 1
-        else {k: v for k, v in schema.items() if k != "default"}
-    )
+    if len(values) == 1:
+        return values[0]
+    return {key: value for key, value in schema.items() if key != "default"}
 
 
 def _default(field: dataclasses.Field) -> Any:
-    return (
-        field.default
-        if field.default is not dataclasses.MISSING
-        else field.default_factory()
-    )  # type: ignore[misc]
+    if field.default is not dataclasses.MISSING:
+        return field.default
+    return field.default_factory()  # type: ignore[misc]
 
 
 @functools.cache
 def meanings(kind: type) -> dict[str, tuple[str, str]]:
-    """Return (unit, meaning) of the fields, from annotations and docstrings of the class and its bases."""
-    names = {f.name for f in dataclasses.fields(kind)}
-    meanings_by_name: dict[str, tuple[str, str]] = {}
+    """Return (unit, meaning) of the fields by name, from annotations and docstrings of
+    the class and its bases."""
+    fields = {field.name for field in dataclasses.fields(kind)}
+    found: dict[str, tuple[str, str]] = {}
     for base in reversed(kind.__mro__):
-        for paragraph in inspect.cleandoc(vars(base).get("__doc__") or "").split(
-            "\n\n"
-        ):
-            marks = [
-                m for m in MARK.finditer(paragraph) if {*m[1].split(", ")} <= names
-            ]
-            for mark, after in zip(marks, [*marks[1:], None]):
-                meaning = " ".join(
-                    paragraph[mark.end() : after.start() if after else None].split()
-                )
-                meanings_by_name |= dict.fromkeys(
-                    mark[1].split(", "),
-                    (mark[2], meaning.rstrip(" .;").replace("`", "")),
-                )
-    return meanings_by_name | {
-        name: (number.unit, number.meaning)
-        for name, number in number_fields(kind).items()
-    }
+        text = inspect.cleandoc(vars(base).get("__doc__") or "")
+        for paragraph in text.split("\n\n"):
+            found |= _meanings_in(paragraph, fields)
+    for name, number in number_fields(kind).items():
+        found[name] = (number.unit, number.meaning)
+    return found
+
+
+def _meanings_in(paragraph: str, fields: set[str]) -> dict[str, tuple[str, str]]:
+    """Return (unit, meaning) of the fields that a paragraph describes, by name."""
+    found = {}
+    marks = [m for m in MARK.finditer(paragraph) if {*m[1].split(", ")} <= fields]
+    ends = [*(mark.start() for mark in marks[1:]), len(paragraph)]
+    for mark, end in zip(marks, ends):
+        meaning = " ".join(paragraph[mark.end() : end].split())
+        for name in mark[1].split(", "):
+            found[name] = (mark[2], meaning.rstrip(" .;").replace("`", ""))
+    return found
 
 
 def first_sentence(kind: type) -> str:
-    """Return the first sentence of a class's docstring; nothing where that tells a key."""
-    paragraph = (
-        inspect.cleandoc(kind.__doc__ or "").partition("\n\n")[0].replace("`", "")
-    )
-    sentence = re.split(
-        r"(?<!Fig\.)(?<!Eqs\.)(?<!Eq\.)(?<!Sec\.)(?<=[.:;])\s",
-        " ".join(paragraph.split()),
-    )[0]
-    return "" if MARK.match(paragraph) else f"{sentence.rstrip('.:;')}."
+    """Return the first sentence of a class's docstring; "" where it describes a key."""
+    paragraph = inspect.cleandoc(kind.__doc__ or "").partition("\n\n")[0]
+    paragraph = paragraph.replace("`", "")
+    if MARK.match(paragraph):
+        return ""
+    # A full stop after an abbreviation ends no sentence.
+    sentence_end = r"(?<!Fig\.)(?<!Eqs\.)(?<!Eq\.)(?<!Sec\.)(?<=[.:;])\s"
+    sentence = re.split(sentence_end, " ".join(paragraph.split()))[0]
+    return f"{sentence.rstrip('.:;')}."

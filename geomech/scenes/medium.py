@@ -1,4 +1,5 @@
-"""Media that a scene takes from files: one that `geomech fit-medium` wrote, or a table of measured drag."""
+"""Media that a scene takes from files: of `geomech fit-medium`, or tables of measured
+drag."""
 
 from __future__ import annotations
 
@@ -21,7 +22,7 @@ from rft.core.refusal import Refusal, located
 
 LARGEST = 1_000_000  # bytes of a medium's file
 ANGLE_RAD = Column("psi", "angle", "rad")
-FORCES = (Column("f_t"), Column("f_n"))  # of a table, in place of those of a rod
+FORCES = (Column("f_t"), Column("f_n"))  # in place of the forces on a rod
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,8 @@ class NamedMedium:
         str,
         Word(
             MEDIA,
-            f"a medium of the catalogue: {', '.join(MEDIA)}; 'geomech scenes --show NAME' prints one",
+            f"a medium of the catalogue: {', '.join(MEDIA)}; 'geomech scenes --show "
+            "NAME' prints one",
         ),
     ]
 
@@ -51,14 +53,15 @@ class MediumFile:
     file: str
 
     def to_part(self, source: Source, place: str, given) -> Any:
-        """Return the medium of the file, which may name another one, of a table of drag."""
+        """Return the medium of the file, which may name another file with a table of
+        drag."""
         path = Path(self.file)
         within = Source(f"{place} {path.name}", files=source.files, folder=path.parent)
-        return read_section(within, "medium", _medium(place, path), MEDIUM)
+        return read_section(within, "medium", _medium_table(place, path), MEDIUM)
 
 
-def _medium(place: str, path: Path) -> dict:
-    """Return the table of a medium's TOML file, which may stand under [medium] or alone."""
+def _medium_table(place: str, path: Path) -> dict:
+    """Return the table of a medium's TOML file: [medium], or the keys of one alone."""
     try:
         text = read_text(path, LARGEST)
     except (OSError, ValueError) as error:
@@ -76,7 +79,7 @@ def _medium(place: str, path: Path) -> dict:
             f"{path.name} is not TOML",
             where=place,
             because=str(error),
-            instead=_table_instead(path),
+            instead=_cure_of_table(path),
         ) from None
     table = tables.get("medium", tables)
     if not isinstance(table, dict) or (table is not tables and len(tables) > 1):
@@ -92,33 +95,36 @@ def _medium(place: str, path: Path) -> dict:
     return table
 
 
-def _table_instead(path: Path) -> str:
-    return (
-        'for a table of drag add law = "table"'
-        if path.suffix.lower() in ENDINGS
-        else ""
-    )
+def _cure_of_table(path: Path) -> str:
+    if path.suffix.lower() in ENDINGS:
+        return 'for a table of drag add law = "table"'
+    return ""
 
 
-def _rows(place: str, file: str) -> dict[str, list]:
-    """Return psi (rad), f_t and f_n of a CSV file."""
+def _drag_table(place: str, file: str) -> dict[str, list]:
+    """Return the columns of a CSV file by name: psi, rad, and f_t and f_n, or the
+    forces on a rod under these names."""
     with located(place):
         source = read_rows(
             file, LARGEST_FILE, "give a CSV file with columns psi_deg,f_t,f_n"
         )
-        is_bare = bool(source.find((), (ANGLE_RAD,)))
-        angle = ANGLE_RAD if is_bare else ANGLE
+        is_in_rad = bool(source.find((), (ANGLE_RAD,)))
+        angle = ANGLE_RAD if is_in_rad else ANGLE
         is_of_rod = bool(source.find((), (ALONG, ACROSS)))
-        forces = (ALONG, ACROSS) if is_of_rod else FORCES
-        columns = source.take((angle, *forces))
+        along, across = (ALONG, ACROSS) if is_of_rod else FORCES
+        columns = source.take((angle, along, across))
     psi = columns[angle.name]
-    psi = psi if is_bare else np.radians(psi)
-    f_t, f_n = (columns[x.name].tolist() for x in forces)
-    return {"psi": psi.tolist(), "f_t": f_t, "f_n": f_n}
+    if not is_in_rad:
+        psi = np.radians(psi)
+    return {
+        "psi": psi.tolist(),
+        "f_t": columns[along.name].tolist(),
+        "f_n": columns[across.name].tolist(),
+    }
 
 
 DRAG = FromFile(
-    _rows,
+    _drag_table,
     "CSV with the header psi_deg,f_t,f_n, in place of psi, f_t and f_n",
     ("psi", "f_t", "f_n"),
 )

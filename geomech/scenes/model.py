@@ -1,5 +1,5 @@
-"""A scene: what is simulated and how finely. It is a value;
-`geomech.studies.scene_tables.SceneTables` stores what is computed for one."""
+"""A scene: what is simulated, and how finely. A scene is a value;
+`geomech.studies.scene_tables.SceneTables` stores the tables computed for one."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ from geomech.tiers.base import Numerics
 from rft.core.refusal import Refusal, formatted, located, printable
 
 FRAME = (
-    "of all velocities and displacements, in place of the body's own key; 'minimum-perturbation', here or there: the one in "
-    "which the connection is smallest"
+    "of all velocities and displacements, in place of the body's own key; "
+    "'minimum-perturbation', here or there: the one in which the connection is smallest"
 )
 SHORT = "swimmer"  # the kind of system whose sections may stand by themselves
 SWIMMER = {
@@ -43,13 +43,13 @@ SWIMMER = {
     "body": OneOf(PARTS["body"], sized=True),
     "effects": Each(PARTS["effects"], sized=True),
 }
-TABLE = {
+TABLE = {  # body and medium of a table whose file does not state them
     "body": OneOf({"chain": PARTS["body"]["chain"]}),
     "medium": MEDIUM,
-}  # of a table whose file does not say them
+}
 
 
-class Displayed:
+class SceneRepr:
     """The `repr` of a scene: its name and its parts, in a line of readable length."""
 
     name: str
@@ -58,13 +58,19 @@ class Displayed:
     numerics: Numerics
 
     def __repr__(self) -> str:
-        return f"Scene({printable(self.name)}: {formatted(self.system, 160)}, {formatted(self.gait, 100)}, {self.numerics!r})"
+        system = formatted(self.system, 160)
+        gait = formatted(self.gait, 100)
+        return f"Scene({printable(self.name)}: {system}, {gait}, {self.numerics!r})"
 
 
 @dataclass(frozen=True, repr=False)
-class Scene(Displayed):
-    """A system and a gait. numerics: the tiers'; the system has its own. name: a built-in one's, or its file's. text: the
-    TOML it was read from, if it was; `geomech.scenes.write` says whether it still holds. files: others it was read from.
+class Scene(SceneRepr):
+    """A system and a gait.
+
+    numerics: of the tiers; the system has its own. name: of a built-in scene, or of the
+    file. text: the TOML from which the scene was read, or "". `geomech.scenes.write`
+    uses it only where it still describes the scene. files: further files from which it
+    was read.
 
     Examples
     --------
@@ -93,16 +99,7 @@ class Scene(Displayed):
 
     def __post_init__(self):
         with located(self.name):
-            for name, kind in (
-                ("name", str),
-                ("text", str),
-                ("files", tuple),
-                ("numerics", Numerics),
-            ):
-                if not isinstance(getattr(self, name), kind):
-                    raise Refusal(
-                        f"{name} must be {kind.__name__}", value=getattr(self, name)
-                    )
+            _check_types(self)
             gait = checked_gait(self.gait)
             object.__setattr__(self, "system", as_system(self.system, gait.joints))
             _check_joints(self.system, gait)
@@ -113,7 +110,8 @@ class Scene(Displayed):
                 note_radius(self.system)
 
     def note_turns(self, gait: Gait, amplitudes: ArrayLike | None = None) -> None:
-        """Warn (`Note`) of a joint that a gait turns by more than a full turn, and of a curve far from its points."""
+        """Warn (`Note`) if a gait turns a joint by more than a full turn, or if its
+        curve is far from its points."""
         if hasattr(gait, "largest"):
             note_angles(self.system, gait.largest(amplitudes))
         if hasattr(gait, "note"):
@@ -129,77 +127,82 @@ class Scene(Displayed):
     )
 
     def with_numerics(self, **changes: Any) -> Scene:
-        """Return the scene with some of its [numerics], or of its system's, changed; None leaves an entry."""
-        own_keys = {f.name for f in _fields(solver_of(self.system))}
-        changes = {k: v for k, v in changes.items() if v is not None}
+        """Return the scene with other entries of [numerics], of the tiers or of its
+        system's solver. An entry that is None stays as it is."""
+        solver_keys = _field_names(solver_of(self.system))
+        changes = {key: value for key, value in changes.items() if value is not None}
+        of_solver = {key: x for key, x in changes.items() if key in solver_keys}
+        of_tiers = {key: x for key, x in changes.items() if key not in solver_keys}
         with located(self.name):
-            system = with_solver(
-                self.system, {k: v for k, v in changes.items() if k in own_keys}
-            )
-            tier_changes = {k: v for k, v in changes.items() if k not in own_keys}
-            for name in tier_changes:
-                choose(
-                    "numerics", name, [*own_keys, *self.numerics.__dataclass_fields__]
-                )
-            return dataclasses.replace(
-                self,
-                system=system,
-                numerics=dataclasses.replace(self.numerics, **tier_changes),
-            )
+            for key in of_tiers:
+                choose("numerics", key, [*solver_keys, *_field_names(self.numerics)])
+            system = with_solver(self.system, of_solver)
+            numerics = dataclasses.replace(self.numerics, **of_tiers)
+            return dataclasses.replace(self, system=system, numerics=numerics)
 
     def changed(self, **changes: Any) -> Scene:
-        """Return the scene with some of its parts, or of its system's, changed."""
-        parts = {
-            k: v
-            for k, v in changes.items()
-            if k in ("system", "gait", "numerics", "name", "text", "files")
-        }
+        """Return the scene with other parts, or with other parts of its system."""
+        own_names = ("system", "gait", "numerics", "name", "text", "files")
+        parts = {key: value for key, value in changes.items() if key in own_names}
+        of_system = {key: value for key, value in changes.items() if key not in parts}
         with located(self.name):
-            system_changes = {k: v for k, v in changes.items() if k not in parts}
             system = unwrapped(parts.get("system", self.system))
-            for name in system_changes:
-                choose(
-                    "part",
-                    name,
-                    [
-                        "system",
-                        "gait",
-                        "numerics",
-                        "name",
-                        *(f.name for f in _fields(system)),
-                    ],
-                )
-            if system_changes:
-                parts["system"] = dataclasses.replace(system, **system_changes)
+            names = ["system", "gait", "numerics", "name", *_field_names(system)]
+            for name in of_system:
+                choose("part", name, names)
+            if of_system:
+                parts["system"] = dataclasses.replace(system, **of_system)
             return dataclasses.replace(self, **parts)
 
     def cycle(
-        self, gait: Gait | None = None, amplitudes: ArrayLike | None = None, phases: int | None = None, work: bool = False
-    ) -> Cycle:  # fmt: skip
-        """Run a gait, or the scene's own, for amplitudes (...,), all at once."""
+        self,
+        gait: Gait | None = None,
+        amplitudes: ArrayLike | None = None,
+        phases: int | None = None,
+        work: bool = False,
+    ) -> Cycle:
+        """Run a gait, by default the scene's, for amplitudes (...,), all at once."""
         gait = checked_gait(self.gait if gait is None else gait)
-        return self.system.run(
-            *gait.cycle(phases or self.numerics.phases, amplitudes), work
-        )
+        alpha, alphadot = gait.cycle(phases or self.numerics.phases, amplitudes)
+        return self.system.run(alpha, alphadot, work)
 
 
-def _fields(thing) -> tuple:
-    return dataclasses.fields(thing) if dataclasses.is_dataclass(thing) else ()
+def _check_types(scene: Scene) -> None:
+    """Raise Refusal for fields of wrong types; not of system and gait."""
+    types = {"name": str, "text": str, "files": tuple, "numerics": Numerics}
+    for name, kind in types.items():
+        value = getattr(scene, name)
+        if not isinstance(value, kind):
+            raise Refusal(f"{name} must be {kind.__name__}", value=value)
+
+
+def _field_names(value: Any) -> list[str]:
+    """Return the names of the fields of a dataclass; none for another object."""
+    if not dataclasses.is_dataclass(value):
+        return []
+    return [field.name for field in dataclasses.fields(value)]
 
 
 def _check_joints(system: System, gait: Gait) -> None:
-    if gait.joints != system.joints:
-        owner, cure = (
-            "[body]",
-            "give the body one link more than the gait has joints, or as many modes, or another gait",
+    """Raise Refusal if a gait moves another number of joints than a system has."""
+    if gait.joints == system.joints:
+        return
+    owner = f"the {kind_of(system)}"
+    cure = "give it another gait"
+    if hasattr(system, "body"):
+        owner = "[body]"
+        cure = (
+            "give the body one link more than the gait has joints, or as many modes, "
+            "or another gait"
         )
-        if not hasattr(system, "body"):
-            owner, cure = f"the {kind_of(system)}", "give it another gait"
-        message = f"[gait] {type(gait).__name__.lower()} moves {gait.joints} joints but {owner} has {system.joints}"
-        raise Refusal(message, instead=cure)
+    raise Refusal(
+        f"[gait] {type(gait).__name__.lower()} moves {gait.joints} joints but {owner} "
+        f"has {system.joints}",
+        instead=cure,
+    )
 
 
-def checked_scene(scene) -> Scene:
+def checked_scene(scene: Any) -> Scene:
     """Return the scene; Refusal if it is none."""
     if not isinstance(scene, Scene):
         raise Refusal(
@@ -209,16 +212,19 @@ def checked_scene(scene) -> Scene:
 
 
 def frequency_of(system: System, gait: Gait) -> float | None:
-    """Return the cycles per second of a system that runs a gait: the gait's, or that of effects which have one; None
-    without either. Refusal if the two contradict each other."""
-    gait_frequency, effect_frequency = (
-        getattr(gait, "frequency", None),
-        system.traits.frequency,
-    )
-    if gait_frequency is None or effect_frequency is None:
-        return effect_frequency if gait_frequency is None else gait_frequency
+    """Return the frequency, Hz, of a system that runs a gait: that of the gait, or of
+    the effects; None without either. Refusal if the two contradict each other."""
+    gait_frequency = getattr(gait, "frequency", None)
+    effect_frequency = system.traits.frequency
+    if gait_frequency is None:
+        return effect_frequency
+    if effect_frequency is None:
+        return gait_frequency
     if np.any(np.asarray(effect_frequency) != gait_frequency):
-        message = f"[gait] frequency = {gait_frequency:g}, but the effects of the {kind_of(system)} have "
-        message += formatted(effect_frequency)
-        raise Refusal(message, because="it is one swimmer", instead="keep one")
+        raise Refusal(
+            f"[gait] frequency = {gait_frequency:g}, but the effects of the "
+            f"{kind_of(system)} have {formatted(effect_frequency)}",
+            because="it is one swimmer",
+            instead="keep one",
+        )
     return gait_frequency

@@ -1,4 +1,4 @@
-"""The reader of a scene's TOML file; scenes that ship with the toolkit are in builtin/."""
+"""The reader of a scene's TOML file. Built-in scenes are in builtin/."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from geomech.scenes.walker import WalkerScene
 
 LARGEST = 10_000_000  # bytes of a scene file
-PIPE = "pipe"  # name of a scene that comes through one, as from /dev/stdin or <(...)
+PIPE = "pipe"  # name of a scene from a pipe, such as /dev/stdin or <(...)
 
 
 def builtin_names() -> list[str]:
@@ -69,15 +69,16 @@ def _folder(name: str) -> Traversable:
 
 
 def _names(folder: str) -> list[str]:
-    return sorted(
-        p.name.removesuffix(".toml")
-        for p in _folder(folder).iterdir()
-        if p.name.endswith(".toml")
-    )
+    names = [path.name for path in _folder(folder).iterdir()]
+    return sorted(x.removesuffix(".toml") for x in names if x.endswith(".toml"))
+
+
+def _all_builtin_names() -> list[str]:
+    return builtin_names() + intruder_names() + walker_names()
 
 
 def builtin_text(name: str) -> str | None:
-    """Return the TOML of a built-in scene; None if there is none of that name."""
+    """Return the TOML of a built-in scene; None if no scene has that name."""
     for folder in ("", "intruders", "walkers"):
         if name in _names(folder):
             return (_folder(folder) / f"{name}.toml").read_text(encoding="utf-8")
@@ -85,8 +86,11 @@ def builtin_text(name: str) -> str | None:
 
 
 def load(scene: str | Path) -> Scene | Any:
-    """Return the scene of a built-in name or a TOML file: an intruder scene if it has an [intruder], a `WalkerScene` if
-    a [robot] (Any, so that no type checker asks which). Refusal if there is none.
+    """Return the built-in scene of a name, or the scene of a TOML file; Refusal if
+    there is none.
+
+    With an [intruder] it is an intruder scene, with a [robot] a `WalkerScene`. The type
+    is Any, so that type checkers do not ask which.
 
     Examples
     --------
@@ -97,17 +101,17 @@ def load(scene: str | Path) -> Scene | Any:
     """
     if not isinstance(scene, (str, Path)):
         raise Refusal("scene must be a name or a TOML file", value=scene)
-    if (text := builtin_text(str(scene))) is not None:
-        return parse(text, str(scene))
-    path, names = Path(scene), builtin_names()
+    builtin = builtin_text(str(scene))
+    if builtin is not None:
+        return parse(builtin, str(scene))
+    path = Path(scene)
     refuse_program(path)
     try:
         if path.suffix != ".toml" and not path.exists():
-            choose("scene", str(scene), names + intruder_names() + walker_names())
+            choose("scene", str(scene), _all_builtin_names())
         text = read_text(path, LARGEST, pipes=True)
-        scene = (
-            PIPE if path.is_fifo() else scene
-        )  # files that it names are looked for from here
+        # Files that a scene from a pipe names are relative to the current folder.
+        name = PIPE if path.is_fifo() else str(scene)
     except Refusal:
         raise
     except (OSError, ValueError) as error:
@@ -115,9 +119,9 @@ def load(scene: str | Path) -> Scene | Any:
         raise Refusal(
             f"cannot read scene {str(scene)!r}",
             because=reason,
-            instead=f"give a TOML file or one of {', '.join(names)}",
+            instead=f"give a TOML file or one of {', '.join(builtin_names())}",
         ) from None
-    result = parse(text, str(scene))
+    result = parse(text, name)
     system: Any = getattr(result, "system", None)
     for line in getattr(system, "assumed", ()):
         note(f"{system.file}: {line}")
@@ -125,9 +129,9 @@ def load(scene: str | Path) -> Scene | Any:
 
 
 def in_medium(scene: Scene, file: str | Path) -> Scene:
-    """Return the scene in another medium, from a file as ``[medium] file`` takes it, or a table of drag if its name
-    ends in .csv; relative to the current folder. Refusal if the file has no medium, or the scene's system takes
-    none.
+    """Return the scene in the medium of a file, as for ``[medium] file``, or of a table
+    of drag if the file's name ends in .csv. Refusal if the file has no medium, or the
+    scene's system takes none.
 
     Examples
     --------
@@ -146,9 +150,11 @@ def in_medium(scene: Scene, file: str | Path) -> Scene:
 
 
 def medium_of(name: str | Path) -> Any:
-    """Return the medium of a name of the catalogue, or of a file as `in_medium` takes it. Refusal for neither."""
+    """Return the medium of the catalogue with a name, or the medium of a file as for
+    `in_medium`. Refusal if there is none."""
     if isinstance(name, Path) or name.lower().endswith((".toml", *ENDINGS)):
-        return _medium_file(name, "medium")[0]
+        medium, _ = _medium_file(name, "medium")
+        return medium
     return MEDIA[choose("medium", name, MEDIA)]
 
 
@@ -157,14 +163,16 @@ def medium_in(text: str) -> Any:
     or a map of stress in the vertical plane."""
     from geomech.scenes.stress import StressKeys
 
-    source, table = reader.Source("medium"), tables_of(text)["medium"]
+    source = reader.Source("medium")
+    table = tables_of(text)["medium"]
     if "law" in table:
         return reader.read_section(source, "medium", table, MEDIUM)
     return reader.build(source, "medium", table, StressKeys)
 
 
 def _medium_file(file: str | Path, place: str) -> tuple[Any, tuple[str, ...]]:
-    """Return the medium of a file, and the files that it was read from. place: what a refusal names."""
+    """Return the medium of a file, and the files from which it was read. place: for a
+    Refusal."""
     table = {"file": str(Path(file).absolute())}
     if Path(file).suffix.lower() in ENDINGS:
         table["law"] = "table"
@@ -173,8 +181,8 @@ def _medium_file(file: str | Path, place: str) -> tuple[Any, tuple[str, ...]]:
 
 
 def inputs(scene: Scene | Intruding | WalkerScene) -> list[Path]:
-    """Return the files that a scene was read from: its own, unless it is built in or came through a pipe, and those of
-    its medium, gait and system, or of an intruder scene's parts.
+    """Return the files from which a scene was read: its own, unless it is built in or
+    came from a pipe, and those of its parts.
 
     Examples
     --------
@@ -182,22 +190,17 @@ def inputs(scene: Scene | Intruding | WalkerScene) -> list[Path]:
     >>> inputs(load("three-link-glass"))  # of a built-in scene there are none
     []
     """
-    alone = hasattr(scene, "intruder") or hasattr(scene, "robot")
-    parts: tuple = () if alone else ((whole := checked_scene(scene)).gait, whole.system)
-    own_file = (
-        []
-        if scene.name in [PIPE, *builtin_names(), *intruder_names(), *walker_names()]
-        else [scene.name]
-    )
-    return [
-        Path(x)
-        for x in (
-            *own_file,
-            *scene.files,
-            *(getattr(part, "file", None) for part in parts),
-        )
-        if x
-    ]
+    names: list[str | None] = []
+    if hasattr(scene, "intruder") or hasattr(scene, "robot"):
+        names += scene.files
+    else:
+        scene = checked_scene(scene)
+        names += scene.files
+        for part in (scene.gait, scene.system):
+            names.append(getattr(part, "file", None))
+    if scene.name not in (PIPE, *_all_builtin_names()):
+        names.insert(0, scene.name)
+    return [Path(name) for name in names if name]
 
 
 def parse(text: str, name: str = "scene") -> Scene | Any:
@@ -222,10 +225,9 @@ def parse(text: str, name: str = "scene") -> Scene | Any:
         raise Refusal("a scene is a TOML text", value=text, where=formatted(name))
     try:
         tables = tables_of(text)
-    except ValueError as error:  # or an integer of too many digits
-        raise Refusal(
-            f"{name} is not TOML", because=f"{error}{hints.line_hint(text, error)}"
-        ) from None
+    except ValueError as error:  # no TOML, or an integer with too many digits
+        reason = f"{error}{hints.line_hint(text, error)}"
+        raise Refusal(f"{name} is not TOML", because=reason) from None
     return from_tables(tables, name, text)
 
 
@@ -242,13 +244,16 @@ def _intruding(tables: Mapping, name: str) -> type[Intruding]:
 
 
 def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | Any:
-    """Return the scene of the tables of a TOML text; Refusal if they make none.
+    """Return the scene of the tables of a TOML text; Refusal if they describe none.
 
     Examples
     --------
     >>> from geomech.scenes import from_tables
-    >>> body, gait = {"kind": "chain"}, {"kind": "circle", "amplitude": 0.5}
-    >>> from_tables({"medium": {"law": "viscous"}, "body": body, "gait": gait}).system.medium.ratio
+    >>> medium = {"law": "viscous"}
+    >>> body = {"kind": "chain"}
+    >>> gait = {"kind": "circle", "amplitude": 0.5}
+    >>> scene = from_tables({"medium": medium, "body": body, "gait": gait})
+    >>> scene.system.medium.ratio
     2.0
     """
     if not isinstance(tables, Mapping):
@@ -256,9 +261,9 @@ def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | An
             "a scene is a dict of tables", value=tables, where=formatted(name)
         )
     if "robot" in tables:
-        from geomech.scenes.walker import WalkerScene, spelled_out
+        from geomech.scenes.walker import WalkerScene, with_implied_names
 
-        return reader.read(WalkerScene, spelled_out(tables, name), name, text)
+        return reader.read(WalkerScene, with_implied_names(tables, name), name, text)
     if {"intruder", "motion"} & {*tables}:
         return reader.read(_intruding(tables, name), tables, name, text)
     return swimming.from_tables(tables, name, text)

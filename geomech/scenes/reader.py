@@ -1,4 +1,5 @@
-"""The reader of scene files: tables of TOML become the parts of a scene that its declarations name."""
+"""The reader of scene files: it builds the parts of a scene from tables of TOML, by the
+scene's declarations."""
 
 from __future__ import annotations
 
@@ -30,18 +31,17 @@ from geomech.scenes.sizes import Sizes
 from rft.core.refusal import Refusal, located
 from rft.core.registry import Registry
 
-FILES = (
-    "file",
-    "mjcf",
-)  # keys that name a file, looked for from the folder of the scene's
+FILES = ("file", "mjcf")  # keys that name a file, relative to the scene's folder
 Built = TypeVar("Built")
 
 
 @dataclass
 class Source:
-    """A scene file that is being read. name: its own. example: a built-in scene with all that is needed. files: names
-    of further files, which reading adds. sizes: given once for all its parts. folder: in which files are looked for,
-    its own if none."""
+    """A scene file that is being read.
+
+    name: of the file. example: a built-in scene that has all required sections. files:
+    names of further files, which the reader adds. sizes: given once for all parts.
+    folder: in which files are looked for; that of the scene file if None."""
 
     name: str
     example: str = "NAME"
@@ -54,19 +54,20 @@ class Source:
         return f"see 'geomech scenes --show {self.example}'"
 
     def located(self, table: Mapping) -> dict:
-        """Return a table whose file, if it names one, is a path from the scene's folder; add that to ``files``."""
+        """Return a table in which the name of a file has its folder, and add the file
+        to ``files``."""
         table = dict(table)
+        folder = self.folder or Path(self.name).absolute().parent
         for key in FILES:
             if isinstance(table.get(key), str):
-                table[key] = str(
-                    (self.folder or Path(self.name).absolute().parent) / table[key]
-                )
+                table[key] = str(folder / table[key])
                 self.files.append(table[key])
         return table
 
 
 def read(scene: type[Built], tables: Mapping, name: str, text: str) -> Built:
-    """Return the scene of the tables of a TOML text; Refusal, which names the place, if they make none."""
+    """Return the scene of the tables of a TOML text; Refusal with the place if they
+    describe none."""
     source = Source(name, scene.example)
     check(scene, tables, source)
     with located(name):
@@ -79,7 +80,7 @@ def read(scene: type[Built], tables: Mapping, name: str, text: str) -> Built:
 
 
 def check(scene: type, tables: Mapping, source: Source) -> None:
-    """Raise Refusal unless the tables are those that a scene declares, and none is missing."""
+    """Raise Refusal for a table that is not declared, or missing."""
     declared = file_sections(scene)
     for table in tables:
         choose(f"{source.name}: table", table, declared)
@@ -95,11 +96,11 @@ def check(scene: type, tables: Mapping, source: Source) -> None:
 
 
 def _check_form(source: Source, path: str, table: Any, section: Section | Key) -> None:
-    """Raise Refusal unless a table is one, or a list of tables where a section is one for each part."""
+    """Raise Refusal unless a value is a table, or a list of tables where a section has
+    one for each part."""
     if isinstance(section, Each):
-        if not (
-            isinstance(table, list) and all(isinstance(each, Mapping) for each in table)
-        ):
+        is_list = isinstance(table, list)
+        if not is_list or not all(isinstance(each, Mapping) for each in table):
             raise Refusal(
                 f"{path} must be tables [[{path}]], one for each", where=source.name
             )
@@ -112,17 +113,21 @@ def _check_form(source: Source, path: str, table: Any, section: Section | Key) -
 
 
 def read_sections(scene: type, tables: Mapping, source: Source) -> dict[str, Any]:
-    """Return the fields of a scene that its sections make; those of a missing section have their defaults."""
+    """Return the fields of a scene that its tables give, by name."""
     parts = {}
     for name, (section, *_) in sections_of(scene).items():
         if name in tables:
             part = read_section(source, name, tables[name], section)
-            parts |= part if isinstance(part, dict) else {name: part}
+            if isinstance(part, dict):  # several fields of the scene
+                parts |= part
+            else:
+                parts[name] = part
     return parts
 
 
 def read_section(source: Source, path: str, table: Any, section: Section) -> Any:
-    """Return the part of a scene that a section makes. path: its name, after those of the sections that it is within."""
+    """Return the part of a scene that a section describes. path: its name, after the
+    names of the sections around it."""
     if isinstance(section, Each):
         return tuple(_read_one(source, f"[{path}]", each, section) for each in table)
     return _read_one(source, path, table, section)
@@ -130,19 +135,19 @@ def read_section(source: Source, path: str, table: Any, section: Section) -> Any
 
 def _read_one(source: Source, path: str, table: Mapping, section: Section) -> Any:
     place = f"{source.name}: [{path}]"
-    variant, table = _chosen(place, source.located(table), section)
+    variant, table = _choose_variant(place, source.located(table), section)
     if isinstance(section, OneOf) and section.sized and source.sizes:
         table = source.sizes.fill(place, table, variant.kind)
-    label, inner = (
-        variant.label or (f"no {section.key!r}" if isinstance(section, OneOf) else ""),
-        {},
-    )
+    label = variant.label
+    if not label and isinstance(section, OneOf):
+        label = f"no {section.key!r}"
+    inner = {}
     if variant.inner:
         _check_keys(place, table, variant.kind, label)
     for field, part in variant.inner.items():
-        within = (
-            field if variant.named.get("kind") == section.short else f"{path}.{field}"
-        )
+        within = f"{path}.{field}"
+        if variant.named.get("kind") == section.short:
+            within = field
         if field in table:
             _check_form(source, within, table[field], part)
             inner[field] = read_section(source, within, table.pop(field), part)
@@ -157,7 +162,8 @@ def _read_one(source: Source, path: str, table: Mapping, section: Section) -> An
     return build(source, place, table, variant.kind, inner, label)
 
 
-def _choose(place: str, word: object, section: OneOf) -> str:
+def _choose_kind(place: str, word: object, section: OneOf) -> str:
+    """Return the name of a kind of a section; Refusal for another word."""
     if isinstance(section.kinds, Registry):
         return choose_part(section.kinds, place, word)
     if isinstance(word, str) and word in section.elsewhere:
@@ -169,33 +175,30 @@ def _choose(place: str, word: object, section: OneOf) -> str:
     return choose(place, word, section.kinds)
 
 
-def _chosen(place: str, table: dict, section: Keys | OneOf) -> tuple[Variant, dict]:
-    """Return which of the classes a section names, and its other keys."""
+def _choose_variant(
+    place: str, table: dict, section: Keys | OneOf
+) -> tuple[Variant, dict]:
+    """Return the kind that a table names, and its other keys."""
     if isinstance(section, Keys):
         return Variant({}, section.kind), table
     if section.key in table:
-        name = _choose(f"{place} {section.key}", table[section.key], section)
+        name = _choose_kind(f"{place} {section.key}", table[section.key], section)
         table = {key: value for key, value in table.items() if key != section.key}
         if not isinstance(section.kinds[name], OneOf):
             return variant_of(section, name), table
-        variant, table = _chosen(place, table, section.kinds[name])
+        variant, table = _choose_variant(place, table, section.kinds[name])
         return variant._replace(named={section.key: name} | dict(variant.named)), table
-    alternatives = {
-        dataclasses.fields(kind)[0].name: kind for kind in section.otherwise
-    }
-    for key, kind in alternatives.items():
-        if key in table:
+    cure = f"add {section.key} = one of {', '.join(section.kinds)}"
+    for kind in section.otherwise:
+        first_key = dataclasses.fields(kind)[0].name
+        if first_key in table:
             return Variant({}, kind), table
-    instead = "".join(f", or {key}" for key in alternatives)
-    raise Refusal(
-        f"has no {section.key!r}",
-        where=place,
-        instead=f"add {section.key} = one of {', '.join(section.kinds)}{instead}",
-    )
+        cure += f", or {first_key}"
+    raise Refusal(f"has no {section.key!r}", where=place, instead=cure)
 
 
 def _from_file(place: str, table: dict, variant: Variant) -> dict:
-    """Return the keys of a section with those of its file in place of the file."""
+    """Return the keys of a section with the values of its file in place of the file."""
     if not variant.file.keys and {*table} != {"file"}:
         raise Refusal(
             f"{variant.label} takes 'file' and nothing else",
@@ -205,9 +208,8 @@ def _from_file(place: str, table: dict, variant: Variant) -> dict:
     if "file" not in table:
         return table
     if variant.file.keys:
-        variant.alternatives.check(
-            place, [spellings(variant.kind).get(key, (key,))[0] for key in table]
-        )
+        fields = [spellings(variant.kind).get(key, (key,))[0] for key in table]
+        variant.alternatives.check(place, fields)
     file = table.pop("file")
     if not isinstance(file, str):
         raise Refusal("file must be the name of a file", value=file, where=place)
@@ -222,10 +224,53 @@ def build(
     inner: Mapping[str, Any] | None = None,
     label: str = "",
 ) -> Built:
-    """Return a part of a class, or the part that a form of its keys makes, from a table of keys; else raise Refusal.
+    """Return the part of a table of keys: an instance of a class, or what the class
+    returns as ``to_part``. Refusal if the keys do not describe one.
 
     inner: fields that are already read. label: how the table names the class."""
+    inner = dict(inner or {})
     _check_keys(place, table, kind, label)
+    values = _field_values(place, table, kind)
+    alternatives = getattr(kind, "alternatives", None)
+    if alternatives:
+        alternatives.check(place, values)
+    for field, word in words_of(kind).items():
+        if field in values:
+            choose(f"{place} {field}", values[field], word.choices)
+    required = {
+        field.name
+        for field in dataclasses.fields(kind)
+        if field.default is field.default_factory
+    }
+    # A swimmer has parts whose types msgspec does not know.
+    if inner and required <= {*inner}:
+        return kind(**inner | values)
+    try:
+        part = msgspec.convert({**values, **inner}, kind)
+        if hasattr(kind, "to_part"):
+            return part.to_part(source, place, {*values})
+        return part
+    except Refusal as refusal:
+        raise refusal.within(place) from None
+    except (ValueError, OverflowError) as error:
+        raise _build_refusal(error, place, table, kind) from None
+
+
+def _build_refusal(error: Exception, place: str, table: Mapping, kind: type) -> Refusal:
+    """Return the refusal, with a cure, for an error of msgspec."""
+    refusal = error.__cause__
+    if isinstance(refusal, Refusal):  # of a class that checks its own values
+        refusal.instead = refusal.instead or hints.value_hint(refusal.what, table, kind)
+        return refusal.within(place)
+    reason = str(error).replace(" - at `$", " - at `").replace(" - at ``", "")
+    message = reason.replace("Object missing required field", "has no")
+    hint = hints.value_hint(reason, table, kind)
+    return Refusal(message, where=place, instead=hint)
+
+
+def _field_values(place: str, table: Mapping, kind: type) -> dict[str, Any]:
+    """Return the values of a table by field, with angles in rad; Refusal for a field
+    that is given under two names."""
     values: dict[str, Any] = {}
     for key, value in table.items():
         field, in_degrees = spellings(kind)[key]
@@ -239,64 +284,38 @@ def build(
         values[field] = _radians(value) if in_degrees else value
         if key == "gamma0_deg":
             _check_degrees(f"{place} {key}", value)
-    if alternatives := getattr(kind, "alternatives", None):
-        alternatives.check(place, values)
-    for field, word in words_of(kind).items():
-        if field in values:
-            choose(f"{place} {field}", values[field], word.choices)
-    if inner and {
-        f.name for f in dataclasses.fields(kind) if f.default is f.default_factory
-    } <= {*inner}:
-        return kind(**inner | values)  # a swimmer, of types that msgspec does not know
-    try:
-        part = msgspec.convert({**values, **(inner or {})}, kind)
-        return (
-            part.to_part(source, place, {*values}) if hasattr(kind, "to_part") else part
-        )
-    except Refusal as refusal:
-        raise refusal.within(place) from None
-    except (ValueError, OverflowError) as error:
-        if isinstance(
-            refusal := error.__cause__, Refusal
-        ):  # of a class that checks its own values
-            refusal.instead = refusal.instead or hints.value_hint(
-                refusal.what, table, kind
-            )
-            raise refusal.within(place) from None
-        reason = str(error).replace(" - at `$", " - at `").replace(" - at ``", "")
-        message = reason.replace(
-            "Object missing required field", "has no"
-        )  # msgspec's words
-        raise Refusal(
-            message, where=place, instead=hints.value_hint(reason, table, kind)
-        ) from None
+    return values
 
 
 def _check_keys(place: str, table: Mapping, kind: type, label: str) -> None:
-    """Raise Refusal for a key that a class has not. label: how the table names the class."""
+    """Raise Refusal for a key that a class does not have. label: how the table names
+    the class."""
     try:
         for key in table:
             choose(f"{place} key", key, spellings(kind))
     except Refusal as refusal:
-        refusal.instead += f" ({label})" if label else ""
+        if label:
+            refusal.instead += f" ({label})"
         raise
 
 
 def _check_degrees(place: str, value) -> None:
-    """Warn (`UnitWarning`) of an angle of grains below a degree: measured ones are ten to twenty."""
+    """Warn (`UnitWarning`) of an angle of grains below a degree: measured ones are ten
+    to twenty degrees."""
     if isinstance(value, (int, float)) and 0 < value < 1:
-        text = f"{place} = {value:g} is less than a degree: if that is in rad, write gamma0 = {value:g}"
+        text = (
+            f"{place} = {value:g} is less than a degree: if that is in rad, write "
+            f"gamma0 = {value:g}"
+        )
         warnings.warn(text, UnitWarning, stacklevel=2)
 
 
-def _radians(degrees):
-    """Return numbers, and numbers in lists, converted from degrees; other values unchanged, to be refused later."""
+def _radians(degrees: Any) -> Any:
+    """Return a number, or numbers in lists, converted from degrees; other values
+    unchanged, as they are refused later."""
     if isinstance(degrees, list):
         return [_radians(x) for x in degrees]
-    if (
-        isinstance(degrees, (int, float))
-        and not isinstance(degrees, bool)
-        and abs(degrees) < 1e300
-    ):
+    is_number = isinstance(degrees, (int, float)) and not isinstance(degrees, bool)
+    if is_number and abs(degrees) < 1e300:
         return math.radians(degrees)
     return degrees

@@ -1,4 +1,5 @@
-"""JSON Schema of a scene file, from the declarations by which it is read: for editors, which complete and check scenes."""
+"""JSON Schema of a scene file, from the declarations by which the file is read. Editors
+complete and check scenes by it."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from geomech.scenes.key import Key, first_sentence, keys_of
 from geomech.scenes.keys import SCENES, all_variants, registry_of
 from geomech.scenes.sections import (
     Alternatives,
-    Declared,
+    Declaration,
     Each,
     OneOf,
     Section,
@@ -26,32 +27,26 @@ from geomech.scenes.solid import KINDS as SOLIDS
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON Schema of a scene file, with a gait, an intruder or a robot that walks; its classes are those
-    registered now."""
+    """Return the JSON Schema of a scene file, with a gait, an intruder or a walking
+    robot, for the classes that are registered now."""
     declared = {group: file_sections(scene) for group, scene in SCENES.items()}
-    groups = {
-        group: {name: _section(section) for name, (section, *_) in sections.items()}
-        for group, sections in declared.items()
+    groups: dict[str, dict[str, Any]] = {}
+    references: dict[str, dict[str, Any]] = {}
+    for group, sections in declared.items():
+        groups[group] = {}
+        references[group] = {}
+        for name, (section, *_) in sections.items():
+            groups[group][name] = _section(section)
+            references[group][name] = {"$ref": f"#/$defs/{group}/{name}"}
+    schemas = {
+        group: _scene_schema(references[group], declared[group]) for group in groups
     }
-    named = {
-        group: {name: {"$ref": f"#/$defs/{group}/{name}"} for name in sections}
-        for group, sections in groups.items()
-    }
-    schemas = {group: _scene_schema(named[group], declared[group]) for group in groups}
     solid = {"required": ["kind"], "properties": {"kind": {"enum": [*SOLIDS]}}}
-    all_names = dict.fromkeys(name for sections in named.values() for name in sections)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "geomech scene",
         "type": "object",
-        "properties": {
-            name: {
-                "anyOf": [
-                    sections[name] for sections in named.values() if name in sections
-                ]
-            }
-            for name in all_names
-        },
+        "properties": _all_sections(references),
         "additionalProperties": False,
         "if": {"required": ["robot"]},
         "then": schemas["walkers"],
@@ -68,210 +63,220 @@ def schema() -> dict[str, Any]:
     }
 
 
+def _all_sections(references: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """Return the schemas of sections by name, each of any kind of scene that has it."""
+    schemas: dict[str, Any] = {}
+    for sections in references.values():
+        for name, reference in sections.items():
+            schemas.setdefault(name, {"anyOf": []})["anyOf"].append(reference)
+    return schemas
+
+
 def _scene_schema(
-    named: dict[str, Any], declared: dict[str, Declared]
+    references: dict[str, Any], declared: dict[str, Declaration]
 ) -> dict[str, Any]:
-    """Return the schema of a scene of sections, by their names in ``named``."""
-    scene = _table(
-        "",
-        named,
-        [
-            name
-            for name, (_, required, instead) in declared.items()
-            if required and not instead
-        ],
-    )
-    for name in {each.instead for each in declared.values() if each.instead}:
-        parts = [
-            part
-            for part, (_, required, instead) in declared.items()
-            if required and instead == name
-        ]
-        scene |= {"if": {"required": [name]}, "else": {"required": parts}}
-    sizes = [
-        rule
-        for name, (section, *_) in declared.items()
-        for rule in _sizes_needed(name, section)
-    ]
-    return scene | ({"allOf": sizes} if sizes else {})
+    """Return the schema of a scene with sections. references: to their schemas, by
+    name."""
+    required = []
+    parts_by_section: dict[str, list[str]] = {}  # parts that may replace a section
+    for name, (_, is_required, instead) in declared.items():
+        if instead:
+            parts = parts_by_section.setdefault(instead, [])
+            if is_required:
+                parts.append(name)
+        elif is_required:
+            required.append(name)
+    scene = _table("", references, required)
+    for section, parts in parts_by_section.items():
+        scene |= {"if": {"required": [section]}, "else": {"required": parts}}
+    rules = []
+    for name, (section, *_) in declared.items():
+        rules += _sizes_needed(name, section)
+    if rules:
+        scene["allOf"] = rules
+    return scene
 
 
 def _section(section: Section | Key) -> dict[str, Any]:
     if isinstance(section, Key):
         return {**section.schema, "description": section.meaning}
     if not isinstance(section, OneOf):
-        one, *others = (_variant(variant) for variant in all_variants(section))
+        table, *others = map(_variant, all_variants(section))
         for other in others:
-            one["properties"] |= other["properties"]
-        return one
-    kinds = [
-        _variant(each, _shared(each) if section.sized else (), section.short)
-        for each in all_variants(section)
-    ]
-    if (
-        registry := registry_of(section)
-    ) is not None:  # the keys of what packages offer are known when it is loaded
-        for other in unloaded(registry)[0]:
+            table["properties"] |= other["properties"]
+        return table
+    kinds = []
+    for variant in all_variants(section):
+        elsewhere = _shared(variant) if section.sized else set()
+        kinds.append(_variant(variant, elsewhere, section.short))
+    registry = registry_of(section)
+    if registry is not None:
+        # The keys of a part from a package are known once the package is loaded.
+        for name in unloaded(registry)[0]:
             kinds.append(
                 {
                     "type": "object",
-                    "properties": {section.key: {"const": other}},
+                    "properties": {section.key: {"const": name}},
                     "required": [section.key],
                 }
             )
-    one = {"anyOf" if len(section.implied) > 1 else "oneOf": kinds}
-    return {"type": "array", "items": one} if isinstance(section, Each) else one
+    # With several names left out a table may fit several kinds.
+    how = "anyOf" if len(section.implied) > 1 else "oneOf"
+    kind = {how: kinds}
+    if isinstance(section, Each):
+        return {"type": "array", "items": kind}
+    return kind
 
 
 def _variant(
     variant: Variant, elsewhere: Collection[str] = (), short: str = ""
 ) -> dict[str, Any]:
-    """Return the schema of a section of one class. elsewhere: keys that may be given in another section. short: the kind
-    whose inner sections may be, too."""
+    """Return the schema of a section of one class. elsewhere: keys that may be given in
+    another section. short: the kind whose inner sections may stand by themselves."""
     alternatives = variant.alternatives
-    either = alternatives.keys if alternatives else ()
-    keys = [
-        key._replace(required=key.required and key.name not in either)
-        for key in keys_in(variant)
-    ]
+    keys = keys_in(variant)
+    if alternatives:
+        # Their rule says which of the keys are required.
+        in_groups = alternatives.keys
+        keys = [
+            key._replace(required=key.required and key.name not in in_groups)
+            for key in keys
+        ]
+    rules = [_given_once(key) for key in keys if len(key.spellings) > 1]
+    for names in _metre_pairs(variant.kind):
+        required = names[0] not in elsewhere and _have_no_default(keys, names)
+        rules.append(_one_of(names, required))
+    if alternatives:
+        keys_by_field = {key.alias or key.name: key for key in keys}
+        rules.append(_alternatives(alternatives, keys_by_field))
+
     named = {key: {"const": name} for key, name in variant.named.items()}
     inner = {field: _section(section) for field, section in variant.inner.items()}
-    needed = [*(named if not variant.implied else ())]
-    needed += [
-        key.name
-        for key in keys
-        if key.required and not key.degrees and key.name not in elsewhere
-    ]
+    needed = [] if variant.implied else [*named]
+    for key in keys:
+        if key.required and not key.degrees and key.name not in elsewhere:
+            needed.append(key.name)
     if short not in variant.named.values():
         needed += variant.needed
-    rules = [_spelled(key) for key in keys if len(key.spellings) > 1]
-    for names in _either(variant.kind):
-        rules.append(_once(names, names[0] not in elsewhere and _lacks(keys, names)))
-    if alternatives:
-        rules.append(
-            _alternatives(alternatives, {key.alias or key.name: key for key in keys})
-        )
-    table = _table(
-        first_sentence(variant.kind), {**named, **_properties(keys), **inner}, needed
-    )
-    return table | ({"allOf": rules} if rules else {})
+    properties = {**named, **_properties(keys), **inner}
+    table = _table(first_sentence(variant.kind), properties, needed)
+    if rules:
+        table["allOf"] = rules
+    return table
 
 
-def _either(kind: type) -> list[tuple[str, str]]:
-    """Return the pairs of keys of which one is in body lengths and the other in m."""
+def _metre_pairs(kind: type) -> list[tuple[str, str]]:
+    """Return the pairs of keys for the same size, in body lengths and in m."""
     metres = getattr(kind, "metres", {})  # of an effect
     return [(name, other.name) for name, other in metres.items()]
 
 
-def _lacks(keys: list[Key], names: tuple[str, str]) -> bool:
-    """Return whether neither of two keys has a value where both are left out."""
+def _have_no_default(keys: list[Key], names: tuple[str, str]) -> bool:
+    """Return whether neither of two keys has a default, so that one must be given."""
     return all(key.default is None for key in keys if key.name in names)
 
 
-def _once(names: Collection[str], required: bool) -> dict[str, Any]:
-    """Return the rule that one of several keys is given, if it must be, and not two."""
+def _one_of(names: Collection[str], required: bool) -> dict[str, Any]:
+    """Return the rule that one of several keys may be given, or must be if
+    ``required``."""
     given = [{"required": [name]} for name in names]
     return {"oneOf": given} if required else {"not": {"allOf": given}}
+
+
+def _given_once(key: Key) -> dict[str, Any]:
+    """Return the rule that a key is given under one of its names."""
+    return _one_of(key.spellings, key.required)
 
 
 def _properties(keys: list[Key]) -> dict[str, Any]:
     """Return the schemas of keys by name, and by their other spellings."""
     schemas = {}
     for key in keys:
-        unit = f" ({key.unit})" if key.unit not in ("", "-") else ""
-        more = (
-            {}
-            if key.required or key.default is None
-            else {"default": json.loads(key.value)}
-        )
-        for name in (key.name, *[key.alias] * bool(key.alias)):
-            schemas[name] = {
-                **key.schema,
-                "description": f"{key.meaning}{unit}",
-                **more,
-            }
+        schema = {**key.schema, "description": key.meaning}
+        if key.unit not in ("", "-"):
+            schema["description"] = f"{key.meaning} ({key.unit})"
+        if not key.required and key.default is not None:
+            schema["default"] = json.loads(key.value)
+        schemas[key.name] = schema
+        if key.alias:
+            schemas[key.alias] = schema
         if key.degrees:
-            bounds = {
-                x: math.degrees(key.schema[x])
-                for x in ("minimum", "maximum")
-                if x in key.schema
-            }
-            schemas[f"{key.name}_deg"] = {
-                **key.schema,
-                **bounds,
-                "description": f"{key.meaning} (degrees)",
-            }
+            schemas[f"{key.name}_deg"] = _schema_in_degrees(key)
     return schemas
 
 
-def _spelled(key: Key) -> dict[str, Any]:
-    """Return the rule that a key is given once, if it must be given, and not twice."""
-    return _once(key.spellings, key.required)
+def _schema_in_degrees(key: Key) -> dict[str, Any]:
+    """Return the schema of a key's other spelling, in degrees."""
+    schema = {**key.schema, "description": f"{key.meaning} (degrees)"}
+    for bound in ("minimum", "maximum"):
+        if bound in key.schema:
+            schema[bound] = math.degrees(key.schema[bound])
+    return schema
 
 
 def _alternatives(alternatives: Alternatives, keys: dict[str, Key]) -> dict[str, Any]:
-    """Return the rule that one group of keys is given, and none of the others."""
-    given = {
-        name: [{"required": [spelling]} for spelling in keys[name].spellings]
-        for name in sorted(alternatives.keys)
-    }
+    """Return the rule that the keys of one group are given, and none of the others.
+    keys: by field."""
+    given = {}  # rules that a key is given, one for each of its spellings
+    for name in sorted(alternatives.keys):
+        given[name] = [{"required": [x]} for x in keys[name].spellings]
     groups = []
     for needed, allowed in alternatives.groups:
-        several = [
-            {"anyOf": given[name]} for name in sorted(needed) if len(given[name]) > 1
-        ]
-        others = [
-            rule
-            for name in given
-            if name not in needed | allowed
-            for rule in given[name]
-        ]
-        groups.append(
-            {
-                "required": sorted(name for name in needed if len(given[name]) == 1),
-                "not": {"anyOf": others},
-            }
-        )
-        groups[-1] |= {"allOf": several} if several else {}
+        others = []
+        for name, rules in given.items():
+            if name not in needed | allowed:
+                others += rules
+        with_one_name = sorted(name for name in needed if len(given[name]) == 1)
+        with_several = sorted(name for name in needed if len(given[name]) > 1)
+        group = {"required": with_one_name, "not": {"anyOf": others}}
+        if with_several:
+            group["allOf"] = [{"anyOf": given[name]} for name in with_several]
+        groups.append(group)
     return {"oneOf": groups}
 
 
 def _shared(variant: Variant) -> set[str]:
-    """Return the keys of a kind that [physical] may give; `_sizes_needed` asks for them there."""
+    """Return the keys of a kind that may be given in [physical]; `_sizes_needed`
+    requires them in one of both places."""
     names = {*variant.named.values()}
-    return {
-        f.name
-        for f in dataclasses.fields(Physical)
-        if not names & {*NOT_OF_THE_BODY.get(f.name, ())}
-    }
+    shared = set()
+    for field in dataclasses.fields(Physical):
+        if not names & {*NOT_OF_THE_BODY.get(field.name, ())}:
+            shared.add(field.name)
+    return shared
 
 
 def _sizes_needed(name: str, section: Section | Key) -> Iterator[dict[str, Any]]:
-    """Yield the rules that a size which a kind must have is given there or in [physical]."""
-    for variant in (
-        all_variants(section) if isinstance(section, OneOf) and section.sized else ()
-    ):
-        keys = keys_of(variant.kind)
-        sizes = [
-            {"required": [key.name]}
-            for key in keys
-            if key.required and key.name in _shared(variant)
-        ]
-        for names in _either(variant.kind):
-            if names[0] in _shared(variant) and _lacks(keys, names):
-                sizes.append({"anyOf": [{"required": [name]} for name in names]})
-        for size in sizes:
-            given = {
+    """Yield the rules that a size which a kind requires is given in its section or in
+    [physical]."""
+    if not isinstance(section, OneOf) or not section.sized:
+        return
+    for variant in all_variants(section):
+        named = {key: {"const": kind} for key, kind in variant.named.items()}
+        is_this_kind = {"required": [*named], "properties": named}
+        for size in _required_sizes(variant):
+            in_physical = {
                 "required": ["physical"],
                 "properties": {"physical": size},
             }
-            named = {key: {"const": kind} for key, kind in variant.named.items()}
-            rule = {
-                "if": {"required": [*named], "properties": named},
-                "then": size,
-            }
-            within = {"items": rule} if isinstance(section, Each) else rule
-            yield {"if": {"not": given}, "then": {"properties": {name: within}}}
+            rule: dict[str, Any] = {"if": is_this_kind, "then": size}
+            if isinstance(section, Each):
+                rule = {"items": rule}
+            yield {"if": {"not": in_physical}, "then": {"properties": {name: rule}}}
+
+
+def _required_sizes(variant: Variant) -> list[dict[str, Any]]:
+    """Return the rules that the shared sizes which a kind requires are given."""
+    keys = keys_of(variant.kind)
+    shared = _shared(variant)
+    sizes: list[dict[str, Any]] = []
+    for key in keys:
+        if key.required and key.name in shared:
+            sizes.append({"required": [key.name]})
+    for names in _metre_pairs(variant.kind):
+        if names[0] in shared and _have_no_default(keys, names):
+            sizes.append({"anyOf": [{"required": [name]} for name in names]})
+    return sizes
 
 
 def _table(about: str, values: dict[str, Any], required: list[str]) -> dict[str, Any]:
@@ -281,4 +286,6 @@ def _table(about: str, values: dict[str, Any], required: list[str]) -> dict[str,
         "required": required,
         "additionalProperties": False,
     }
-    return {"description": about, **schema} if about else schema
+    if about:
+        return {"description": about, **schema}
+    return schema

@@ -1,4 +1,4 @@
-"""Intruder scenes of triangle meshes, which move in any way in three dimensions."""
+"""Intruder scenes of triangle meshes that move in three dimensions as prescribed."""
 
 from __future__ import annotations
 
@@ -38,17 +38,19 @@ KINDS = {
 }
 COURSE = FromFile(
     columns_reader(("t", "x", "y", "z"), ("rx", "ry", "rz")),
-    "CSV with the header t,x,y,z or t,x,y,z,rx,ry,rz (rotation vector) (s, m, rad); velocities are differences of order 2 in "
-    "the spacing of t",
+    "CSV with the header t,x,y,z or t,x,y,z,rx,ry,rz (rotation vector) (s, m, rad); "
+    "velocities are differences of order 2 in the spacing of t",
 )
 TRIANGLES = (
     "of the mesh, about, 1 to 2,000,000; a mesh from a file has at least its own"
 )
 
 
-class Passed(NamedTuple):
-    """Forces along a motion. force, moment (T, 3), N and N m about the mesh's origin, in the world frame; power (T,) W
-    of the grains on the body. With effects that have a weight the force is that of both."""
+class MeshIntrusion(NamedTuple):
+    """Forces along a motion, in the world frame.
+
+    force: (T, 3), N, with the weights of effects. moment: (T, 3), N m, about the mesh's
+    origin. power: (T,), W, of the grains on the body."""
 
     trajectory: Trajectory
     force: np.ndarray
@@ -61,18 +63,18 @@ class Passed(NamedTuple):
 
     def __repr__(self) -> str:
         span = summary.span
-        force, moment = (
-            ", ".join(f"{a} {span(f)}" for a, f in zip("xyz", x.T))
-            for x in (self.force, self.moment)
-        )
+        force = ", ".join(f"{a} {span(x)}" for a, x in zip("xyz", self.force.T))
+        moment = ", ".join(f"{a} {span(x)}" for a, x in zip("xyz", self.moment.T))
         described = f"force {force} N; moment {moment} N m; power {span(self.power)} W"
-        return f"Passed({len(self.t)} poses, t {span(self.t)} s; {described})"
+        return f"MeshIntrusion({len(self.t)} poses, t {span(self.t)} s; {described})"
 
 
 @dataclass(frozen=True)
 class MeshScene(Intruding):
-    """A medium of three dimensions, a solid body and its motion, and effects. triangles: of its mesh, about. matched: what
-    the medium's strength was taken from, where it was told by a name of the vertical plane.
+    """A medium of three dimensions, a solid body and its motion, and effects.
+
+    triangles: of its mesh, about. matched: how the medium's strength was matched to a
+    map of the vertical plane, if it was; else "".
 
     Examples
     --------
@@ -97,8 +99,9 @@ class MeshScene(Intruding):
     files: tuple[str, ...] = field(default=(), repr=False, compare=False)
     matched: str = field(default="", compare=False)
 
-    parts, finer = "triangles", (4,)
-    order = 1  # 2 in their size
+    parts = "triangles"
+    finer = (4,)
+    order = 1  # in their number; 2 in their size
     per_part = 1.5e-7
     field_types = {
         "medium": (Spatial, "a medium such as Spatial(xi_n=3e5)"),
@@ -134,41 +137,43 @@ class MeshScene(Intruding):
     def size(self) -> float:
         return float(np.ptp(self.mesh.vertices, axis=0).max())
 
-    def run(self, triangles: int | None = None) -> Passed:
-        """Return forces along the motion, with the scene's number of triangles or another."""
-        mesh = self.mesh if triangles is None else self.intruder.mesh(triangles)
+    def run(self, triangles: int | None = None) -> MeshIntrusion:
+        """Return forces along the motion. triangles: in place of the scene's."""
+        mesh = self.mesh
+        if triangles is not None:
+            mesh = self.intruder.mesh(triangles)
         trajectory = self.motion.trajectory(mesh)
+        _, place, rotation, velocity, spin, _ = trajectory
         result = wrench(
-            self.medium, mesh, *trajectory[2:0:-1], *trajectory[3:5], self.effects
+            self.medium, mesh, rotation, place, velocity, spin, self.effects
         )
-        return Passed(
-            trajectory, self.weighed(result.force), result.moment, result.power
-        )
+        force = self.weighed(result.force)
+        return MeshIntrusion(trajectory, force, result.moment, result.power)
 
-    def faces(self, result: Passed, k: int) -> tuple[Faces, np.ndarray]:
-        """Return the loads on each face below the surface at step k, and the triangles (Q, 3, 3) above it."""
+    def faces(self, result: MeshIntrusion, k: int) -> tuple[Faces, np.ndarray]:
+        """Return the loads on each face below the surface at step k, and the triangles
+        (Q, 3, 3) above it, m."""
         _, place, rotation, velocity, spin, _ = (x[k] for x in result.trajectory)
         world = (self.mesh.vertices @ rotation.T + place)[self.mesh.faces]
         above = below(world, -world[..., 2])[0]
-        return bearing(
+        faces = bearing(
             self.medium, self.mesh, rotation, place, velocity, spin, self.effects
-        ), above
-
-    def table(self, result: Passed) -> dict[str, np.ndarray]:
-        """Return the columns of a result: t, angle (or x, y, z, if the body does not turn about a hub), force_x,
-        force_y, force_z, moment_x, moment_y, moment_z, and once more the one about y as moment."""
-        trajectory = result.trajectory
-        place = (
-            {"angle": trajectory.angle}
-            if self.motion.turns
-            else dict(zip("xyz", trajectory.place.T))
         )
-        force = {f"force_{a}": f for a, f in zip("xyz", result.force.T)}
-        moment = {f"moment_{a}": m for a, m in zip("xyz", result.moment.T)}
-        return {
-            "t": trajectory.t,
-            **place,
-            **force,
-            **moment,
-            "moment": result.moment[:, 1],
-        }
+        return faces, above
+
+    def table(self, result: MeshIntrusion) -> dict[str, np.ndarray]:
+        """Return the columns of a result: t; angle, or x, y, z if the body does not
+        turn about a hub; force_x, force_y, force_z, moment_x, moment_y, moment_z; and
+        moment, which is moment_y, as scenes of the vertical plane have it."""
+        trajectory = result.trajectory
+        columns = {"t": trajectory.t}
+        if self.motion.turns:
+            columns["angle"] = trajectory.angle
+        else:
+            columns |= zip("xyz", trajectory.place.T)
+        for axis, values in zip("xyz", result.force.T):
+            columns[f"force_{axis}"] = values
+        for axis, values in zip("xyz", result.moment.T):
+            columns[f"moment_{axis}"] = values
+        columns["moment"] = result.moment[:, 1]
+        return columns

@@ -1,4 +1,5 @@
-"""Digests of the sources of code of one's own: what other code computed is not resumed."""
+"""Digests of the sources of custom code: results that other code computed are not
+resumed."""
 
 from __future__ import annotations
 
@@ -12,22 +13,19 @@ from collections.abc import Iterable, Iterator
 from importlib.machinery import PathFinder
 from pathlib import Path
 
-INSTALLED = tuple(
-    {
-        sysconfig.get_path(name)
-        for name in ("stdlib", "platstdlib", "purelib", "platlib")
-    }
-)
-UNKNOWN = (
-    secrets.token_hex()
-)  # of a module without a file, as of a notebook: no other process has it
+# Folders of the standard library and of installed packages.
+SCHEMES = ("stdlib", "platstdlib", "purelib", "platlib")
+INSTALLED = tuple({sysconfig.get_path(scheme) for scheme in SCHEMES})
+# Digest of a module without a file, as of a notebook; no other process has it.
+UNKNOWN = secrets.token_hex()
 
 
 def digests(modules: Iterable[str], texts: dict[str, bytes]) -> dict[str, str]:
-    """Return digests of modules, and of those of the same packages, or of no installed one, that these import, by name.
+    """Return digests of modules, and of the modules that they import, by name. Imported
+    modules count if they are of the same packages, or of no installed one.
 
-    texts: of modules as they were first read, to which this adds. A module counts wherever it is imported: its functions may
-    stand in containers, its constants in formulas, and a function may import it only when it is called."""
+    texts: sources of modules as they were first read, to which this adds. A module
+    counts wherever it is imported: a function may import it only when it is called."""
     result: dict[str, str] = {}
     packages = {name.partition(".")[0] for name in modules}
     remaining = sorted(modules)
@@ -35,48 +33,53 @@ def digests(modules: Iterable[str], texts: dict[str, bytes]) -> dict[str, str]:
         for name in remaining:
             text = texts.get(name) or texts.setdefault(name, _text(name))
             result[name] = hashlib.sha256(text).hexdigest() if text else UNKNOWN
-        imported = {
-            other for name in remaining for other in _imported(name, texts[name])
-        }
-        remaining = sorted(
-            name for name in imported - {*result} if _is_own(name, packages)
-        )
+        imported: set[str] = set()
+        for name in remaining:
+            imported.update(_imported_names(name, texts[name]))
+        new = imported - {*result}
+        remaining = sorted(name for name in new if _is_own(name, packages))
     return result
 
 
-def _imported(module: str, text: bytes) -> Iterator[str]:
-    """Yield the names of all that may be modules in the import statements of a module."""
+def _imported_names(module: str, text: bytes) -> Iterator[str]:
+    """Yield the names in the import statements of a module that may be modules."""
     try:
         nodes = ast.walk(ast.parse(text))
     except (SyntaxError, ValueError):  # it is compiled code
         return
     package = module.split(".")
-    package = package if (_file(module) or "").endswith("__init__.py") else package[:-1]
+    if not (_file(module) or "").endswith("__init__.py"):
+        package = package[:-1]
     for node in nodes:
+        if not isinstance(node, ast.Import | ast.ImportFrom):
+            continue
         base: list[str] = []
         if isinstance(node, ast.ImportFrom):
-            base = package[: len(package) + 1 - node.level] * bool(node.level) + [
-                node.module or ""
-            ] * bool(node.module)
-        if isinstance(node, ast.Import | ast.ImportFrom):
-            for alias in node.names:
-                yield from _with_packages(".".join([*base, alias.name]))
+            if node.level:  # a relative import
+                base += package[: len(package) + 1 - node.level]
+            if node.module:
+                base.append(node.module)
+        for alias in node.names:
+            yield from _with_packages(".".join([*base, alias.name]))
 
 
 def _with_packages(module: str) -> Iterator[str]:
-    """Return a module's name after those of the packages it is in."""
+    """Yield the names of the packages in which a module is, then its own."""
     return itertools.accumulate(module.split("."), "{}.{}".format)
 
 
 def _file(module: str) -> str | None:
-    """Return the file of a module, which is not loaded for that; None if there is none."""
+    """Return the file of a module, without loading it; None if there is none."""
     if module in sys.modules:
         return getattr(sys.modules[module], "__file__", None)
-    path = spec = None
+    path = None
+    spec = None
     for name in _with_packages(module):
-        if (spec := PathFinder.find_spec(name, path)) is None or (
-            path := spec.submodule_search_locations
-        ) is None:
+        spec = PathFinder.find_spec(name, path)
+        if spec is None:
+            return None
+        path = spec.submodule_search_locations
+        if path is None:  # a module, in which there are no others
             break
     return spec.origin if spec and spec.name == module else None
 
@@ -91,8 +94,11 @@ def _text(module: str) -> bytes:
 def _is_own(module: str, packages: set[str]) -> bool:
     """Return whether a module is of the same packages, or of no installed one."""
     package = module.partition(".")[0]
-    if package in ("rft", "geomech") or not (file := _file(module)):
+    if package in ("rft", "geomech"):
         return False
-    return package in packages or not any(
-        Path(file).is_relative_to(folder) for folder in INSTALLED
-    )
+    file = _file(module)
+    if not file:
+        return False
+    if package in packages:
+        return True
+    return not any(Path(file).is_relative_to(folder) for folder in INSTALLED)

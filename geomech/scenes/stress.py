@@ -1,5 +1,5 @@
-"""The [medium] of scenes without a swimmer: stress maps of the vertical plane and the law of three dimensions, by name, by
-their numbers, or from files."""
+"""The [medium] of scenes without a swimmer: stress maps of the vertical plane and the
+law of three dimensions, by name, by their numbers, or from files."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from rft.terradynamics.plates import VERTICAL, PlateDrags, PlateStress, StressMa
 from rft.terradynamics.plates.stress import COEFFICIENTS
 
 LARGEST = 10_000_000  # bytes of a TOML file
-RADIANS = 3.2  # a table of angles within this is likely not in degrees
+LARGEST_RADIANS = 3.2  # angles that are all smaller are likely not in degrees
 Named = Annotated[
     str | None,
     Word(VERTICAL, f"{', '.join(VERTICAL)}; 'geomech scenes --show NAME' prints one"),
@@ -34,7 +34,7 @@ Named = Annotated[
 
 
 def _optional_field(kind: type, name: str):
-    """Return the type of a field of a class in a form that may leave it out."""
+    """Return the type of a field of a class, which may also be None."""
     hint = get_type_hints(kind, include_extras=True)[name]
     return Annotated[(get_args(hint)[0] | None, *hint.__metadata__)]
 
@@ -42,10 +42,11 @@ def _optional_field(kind: type, name: str):
 def _strengths(
     *groups: Collection[str], more: Collection[str], cure: str
 ) -> Alternatives:
-    """Return the keys that a strength is given by: a name or a file, either with ``more``, or one of the groups."""
+    """Return the keys by which a strength is given: a name or a file, with those of
+    ``more`` if wanted; or one of the groups."""
     by_name = [({key}, {*more}) for key in ("name", "file")]
-    exact = [({*group}, set()) for group in groups]
-    return Alternatives((*by_name, *exact), cure, "strength")
+    by_numbers = [({*group}, set()) for group in groups]
+    return Alternatives((*by_name, *by_numbers), cure, "strength")
 
 
 _Coefficients = dataclasses.make_dataclass(
@@ -58,10 +59,12 @@ _Coefficients = dataclasses.make_dataclass(
 
 @dataclass(frozen=True)
 class StressKeys(_Coefficients):
-    """Give one of name, file and all nine coefficients, or zeta alone, which is that of the generic set.
+    """Give one of name, file and all nine coefficients, or zeta alone, which is that of
+    the generic set.
 
-    file (-): TOML with such a table, or CSV of plate drags with the header beta,gamma,alpha_x,alpha_z (degrees, N/cm^3).
-    tension (-): "keep", or "cut" for no stress on faces that the map pulls on.
+    file (-): TOML with such a table, or CSV of plate drags with the header
+    beta,gamma,alpha_x,alpha_z (degrees, N/cm^3). tension (-): "keep", or "cut" for no
+    stress on faces that the map pulls on.
     """
 
     zeta: Annotated[
@@ -77,7 +80,7 @@ class StressKeys(_Coefficients):
     file: str | None = None
     aliases = {key: key.replace("m", "-") for key in COEFFICIENTS if "m" in key}
     makes = StressMap
-    # Something must be given: a file that is empty or cut off is no medium.
+    # One is required: an empty table, as of a file that was cut off, is no medium.
     alternatives = Alternatives(
         (
             ({"name"}, {"zeta"}),
@@ -85,36 +88,37 @@ class StressKeys(_Coefficients):
             ({*COEFFICIENTS}, {"zeta"}),
             ({"zeta"}, set()),
         ),
-        "keep one of 'name', 'file' and the nine coefficients, in N/cm^3; or give zeta alone, "
-        "times the generic set (zeta = 1 is the generic set)",
+        "keep one of 'name', 'file' and the nine coefficients, in N/cm^3; or give zeta "
+        "alone, times the generic set (zeta = 1 is the generic set)",
         "strength",
     )
 
     def to_part(
         self, source: Source, place: str, given: Collection[str]
     ) -> PlateStress:
-        """Return the stress map. What is given beside its name, file or coefficients takes the place of its own."""
-        base = StressMap(
-            **{key: getattr(self, key) for key in COEFFICIENTS if key in given}
-        )
-        if {"name", "file"} & {*given}:
-            base = (
-                VERTICAL[self.name].stress
-                if self.name
-                else _read_stress(source, place, self.file)
-            )
-        changed = {
-            key: getattr(self, key) for key in ("grazing", "tension") if key in given
-        }
-        return dataclasses.replace(base, zeta=base.zeta * self.zeta, **changed)
+        """Return the stress map. Other keys that are given replace those of a name or a
+        file."""
+        if self.name:
+            base: PlateStress = VERTICAL[self.name].stress
+        elif self.file is not None:
+            base = _read_stress(source, place, self.file)
+        else:
+            coefficients = [key for key in COEFFICIENTS if key in given]
+            base = StressMap(**{key: getattr(self, key) for key in coefficients})
+        changed = {"zeta": base.zeta * self.zeta}
+        for key in ("grazing", "tension"):
+            if key in given:
+                changed[key] = getattr(self, key)
+        return dataclasses.replace(base, **changed)
 
 
 @dataclass(frozen=True)
 class SpatialKeys(Spatial):
-    """Give one of name, file (either with zeta, if wanted), xi_n, and density with internal_friction.
+    """Give one of name, file (either with zeta, if wanted), xi_n, and density with
+    internal_friction.
 
-    file (-): TOML with a table [medium] of the vertical plane, or CSV of plate drags with the header
-    beta,gamma,alpha_x,alpha_z (degrees, N/cm^3).
+    file (-): TOML with a table [medium] of the vertical plane, or CSV of plate drags
+    with the header beta,gamma,alpha_x,alpha_z (degrees, N/cm^3).
     """
 
     xi_n: _optional_field(Spatial, "xi_n") = None  # type: ignore[valid-type]
@@ -129,36 +133,42 @@ class SpatialKeys(Spatial):
             1,
             1e5,
             "kg/m^3",
-            "critical density of the grains, 1 to 1e5; with internal_friction, in place of xi_n",
+            "critical density of the grains, 1 to 1e5; with internal_friction, in "
+            "place of xi_n",
         ),
     ] = None
     internal_friction: Annotated[
         float | None,
         Number(
-            0.05, 1.5, "-",
-            "mu, tan of the angle of repose of the grains, 0.05 to 1.5; with density, in place of xi_n",
+            0.05,
+            1.5,
+            "-",
+            "mu, tan of the angle of repose of the grains, 0.05 to 1.5; with density, "
+            "in place of xi_n",
         ),
-    ] = None  # fmt: skip
+    ] = None
     makes = Spatial
     alternatives = _strengths(
         ["xi_n"],
         ["density", "internal_friction"],
         more=["zeta"],
-        cure="give 'xi_n' (N/m^3), or 'density' and 'internal_friction', or 'name' or 'file' and, if wanted, 'zeta'",
+        cure="give 'xi_n' (N/m^3), or 'density' and 'internal_friction', or 'name' or "
+        "'file' and, if wanted, 'zeta'",
     )
 
     def to_part(self, source: Source, place: str, given: Collection[str]) -> Spatial:
-        """Return the medium, as strong as the grains, or as a map of the vertical plane on a plate pushed down."""
+        """Return the medium. Its strength is that of the grains, or that of a map of
+        the vertical plane on a plate pushed down, or xi_n."""
         more = {
             key: getattr(self, key)
             for key in ("surface_friction", "tension", "grazing")
         }
         if self.density is not None:
             return Spatial.from_grains(self.density, self.internal_friction, **more)
-        if strength := {*given} & {"name", "file", "zeta"}:
-            vertical = build(
-                source, place, {key: getattr(self, key) for key in strength}, StressKeys
-            )
+        strength = {*given} & {"name", "file", "zeta"}
+        if strength:
+            table = {key: getattr(self, key) for key in strength}
+            vertical = build(source, place, table, StressKeys)
             return Spatial(matched_strength(vertical), **more)
         return Spatial(self.xi_n, **more)
 
@@ -167,35 +177,41 @@ class MatchedKeys(SpatialKeys):
     __doc__ = SpatialKeys.__doc__
 
     def to_part(self, source: Source, place: str, given: Collection[str]) -> dict:
-        """Return the medium, and what its strength was matched to, if to a map of the vertical plane."""
+        """Return the medium and, if its strength is that of a map of the vertical
+        plane, a text about the match; else ""."""
         medium = super().to_part(source, place, given)
         source_name = self.name or Path(self.file or "").name
+        if not source_name:
+            return {"medium": medium, "matched": ""}
         times = f"{self.zeta:g} times " if self.zeta != 1.0 else ""
-        vertical = (
-            f"{times}alpha_z(0, 90 degrees) of {source_name} in the vertical plane"
+        match = (
+            f"xi_n = {medium.xi_n:.4g} N/m^3, matched to {times}alpha_z(0, 90 degrees) "
+            f"of {source_name} in the vertical plane"
         )
-        match = f"xi_n = {medium.xi_n:.4g} N/m^3, matched to {vertical}"
-        return {"medium": medium, "matched": match if source_name else ""}
+        return {"medium": medium, "matched": match}
 
 
 def matched_strength(stress: PlateStress) -> float:
-    """Return xi_n, N/m^3, with which a flat plate pushed straight down bears the load that a map of the vertical plane
-    gives."""
-    flat, down = (0.0, -1.0), (0.0, -1.0)
-    return 1e6 * float(stress.alpha(flat, down)[1]) / Spatial(1.0).plate
+    """Return xi_n, N/m^3, with which a flat plate pushed straight down bears the same
+    load as with a map of the vertical plane."""
+    normal = (0.0, -1.0)
+    direction = (0.0, -1.0)
+    return 1e6 * float(stress.alpha(normal, direction)[1]) / Spatial(1.0).plate
 
 
 def plate_rows(place: str, file) -> np.ndarray:
-    """Return plate drags of a CSV file, (4, N): beta, gamma in degrees, alpha_x, alpha_z in N/cm^3."""
+    """Return plate drags of a CSV file, (4, N): beta, gamma, degrees; alpha_x, alpha_z,
+    N/cm^3."""
     drags = columns(place, file, ("beta", "gamma", "alpha_x", "alpha_z"))
     rows = np.stack(list(drags.values()))
-    if rows.size and np.abs(rows[:2]).max() < RADIANS:
+    largest = np.abs(rows[:2]).max(initial=0.0)
+    if rows.size and largest < LARGEST_RADIANS:
         raise Refusal(
             "beta and gamma look like radians",
             where=(place, Path(file).name),
             instead="give degrees",
         )
-    if rows.size and (largest := np.abs(rows[:2]).max()) > 360:
+    if largest > 360:
         raise Refusal(
             f"beta and gamma must be from -360 to 360 degrees, got {largest:g}",
             where=(place, Path(file).name),
@@ -211,8 +227,10 @@ def plate_drags(place: str, file) -> PlateDrags:
 
 
 def medium(name: str) -> PlateStress:
-    """Return the stress map of a name of the catalogue, a TOML file with a table [medium] (or nothing but one), or a CSV
-    file of plate drags, for bodies in the vertical plane and in `rft.mujoco.attach`; ValueError for anything else.
+    """Return a stress map, for bodies in the vertical plane and in `rft.mujoco.attach`.
+
+    name: of a medium of the catalogue, or of a file: TOML with a table [medium], or
+    with the keys of one alone, or CSV of plate drags. ValueError for anything else.
 
     Examples
     --------
@@ -229,7 +247,8 @@ def medium(name: str) -> PlateStress:
 
 
 def _read_stress(source: Source, place: str, file: str) -> PlateStress:
-    """Return the stress map of a TOML file, or of plate drags if its name ends as that of a table (`ENDINGS`)."""
+    """Return the stress map of a TOML file, or of plate drags if the file's name ends
+    as that of a table (`ENDINGS`)."""
     path = Path(file)
     if path.suffix.lower() in ENDINGS:
         return plate_drags(place, file)
@@ -237,9 +256,11 @@ def _read_stress(source: Source, place: str, file: str) -> PlateStress:
         tables = tables_of(read_text(path, LARGEST))
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "it is not TOML"
-        cure = f"give a TOML or CSV file or one of {', '.join(VERTICAL)}"
         raise Refusal(
-            f"cannot read {file!r}", where=place, because=reason, instead=cure
+            f"cannot read {file!r}",
+            where=place,
+            because=reason,
+            instead=f"give a TOML or CSV file or one of {', '.join(VERTICAL)}",
         ) from None
     table = tables.get("medium", tables)
     if not isinstance(table, Mapping):
@@ -248,11 +269,12 @@ def _read_stress(source: Source, place: str, file: str) -> PlateStress:
             where=(place, path.name),
         )
     if isinstance(table.get("file"), str):
-        table = {**table, "file": str(path.absolute().parent / table["file"])}
-        if Path(table["file"]).suffix.lower() not in ENDINGS:
+        drags = path.absolute().parent / table["file"]
+        if drags.suffix.lower() not in ENDINGS:
             raise Refusal(
-                f"{path.name} names another file, {Path(table['file']).name}",
+                f"{path.name} names another file, {drags.name}",
                 where=place,
                 instead="copy the coefficients",
             )
+        table = {**table, "file": str(drags)}
     return build(source, f"{place_prefix(place)}{path.name}", table, StressKeys)

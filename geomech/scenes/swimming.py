@@ -1,9 +1,11 @@
-"""The reader of scenes with a gait: values that apply to the whole scene, and the short form of a swimmer."""
+"""The reader of scenes with a gait: values that apply to the whole scene, and the short
+form of a swimmer."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from typing import Any
 
 from geomech.core.errors import choose
 from geomech.scenes import reader
@@ -32,36 +34,27 @@ def from_tables(tables: Mapping, name: str, text: str) -> Scene:
     tables, fitted = _without_fitted(tables, name)
     source.sizes = Sizes(name, tables)
     with located(name):
-        section = sections_of(Scene)["gait"].section
-        gait = reader.read_section(
-            dataclasses.replace(source, files=[]), "gait", tables["gait"], section
-        )
-        system = reader.read_sections(Scene, {"system": _system(tables, name)}, source)[
-            "system"
-        ]
-        source.sizes.all_used()
+        gait_section = sections_of(Scene)["gait"].section
+        # A gait knows its file itself: it is none of the scene's files.
+        gait_source = dataclasses.replace(source, files=[])
+        gait = reader.read_section(gait_source, "gait", tables["gait"], gait_section)
+        table = {"system": _system_table(tables, name)}
+        system = reader.read_sections(Scene, table, source)["system"]
+        source.sizes.check_all_used()
         system, numerics = _with_numerics(system, tables.get("numerics", {}), source)
-        files = tuple(
-            file for file in source.files if file != getattr(system, "file", None)
-        )  # which it knows itself
-        return Scene(
-            framed(system, numerics) if fitted else system,
-            gait,
-            numerics,
-            name,
-            text,
-            files,
-        )
+        if fitted:
+            system = framed(system, numerics)
+        own_file = getattr(system, "file", None)  # which the system knows itself
+        files = tuple(file for file in source.files if file != own_file)
+        return Scene(system, gait, numerics, name, text, files)
 
 
-def _system(tables: Mapping, name: str) -> dict:
-    """Return the table of the system. [medium], [body] and [[effects]] are short for a swimmer, in whose own table they
-    may also stand."""
+def _system_table(tables: Mapping, name: str) -> dict:
+    """Return the table of the system. [medium], [body] and [[effects]] are the short
+    form of a swimmer; they may also stand in its table [system]."""
     table = tables.get("system", {"kind": SHORT})
-    short, kind = (
-        {part: tables[part] for part in SWIMMER if part in tables},
-        table.get("kind"),
-    )
+    kind = table.get("kind")
+    short = {part: tables[part] for part in SWIMMER if part in tables}
     if short and isinstance(kind, str) and kind in {*SYSTEMS} - {SHORT}:
         raise Refusal(
             f"a {kind} takes no {sorted(short)[0]!r}",
@@ -76,59 +69,65 @@ def _with_numerics(
 ) -> tuple[System, Numerics]:
     """Return a system with its part of [numerics], and the rest, for the tiers."""
     place = f"{source.name}: [numerics]"
-    solver_class = NoSolver if (solver := solver_of(system)) is None else type(solver)
-    names = [
-        field.name
-        for kind in (Numerics, solver_class)
-        for field in dataclasses.fields(kind)
-    ]
-    by_solver = {True: {}, False: {}}
+    solver = solver_of(system)
+    solver_class = NoSolver if solver is None else type(solver)
+    fields = dataclasses.fields(Numerics) + dataclasses.fields(solver_class)
+    names = [field.name for field in fields]
+    of_solver = {}
+    of_tiers = {}
     for key, value in given.items():
-        if key not in spellings(Numerics) and key not in spellings(solver_class):
-            choose(f"{place} key", key, names)
-        by_solver[key in spellings(solver_class)][key] = value
-    if by_solver[True]:
-        system = system.with_solver(
-            reader.build(source, place, by_solver[True], solver_class)
-        )
-    return system, reader.build(source, place, by_solver[False], Numerics)
+        if key in spellings(solver_class):
+            of_solver[key] = value
+        else:
+            if key not in spellings(Numerics):
+                choose(f"{place} key", key, names)
+            of_tiers[key] = value
+    if of_solver:
+        solver = reader.build(source, place, of_solver, solver_class)
+        system = system.with_solver(solver)
+    return system, reader.build(source, place, of_tiers, Numerics)
 
 
 def solvers() -> list[type]:
-    """Return the classes of keys in [numerics] that systems have beside those of the tiers."""
-    return [
-        *dict.fromkeys(
-            type(kind.solver)
-            for kind in SYSTEMS.values()
-            if getattr(kind, "solver", None)
-        )
-    ]
+    """Return the classes of the keys in [numerics] that only some systems have."""
+    classes = []
+    for kind in SYSTEMS.values():
+        solver = getattr(kind, "solver", None)
+        if solver and type(solver) not in classes:
+            classes.append(type(solver))
+    return classes
 
 
 def _without_fitted(tables: Mapping, name: str) -> tuple[dict, bool]:
-    """Return the tables without the minimum-perturbation frame, and whether they request it: above all tables, in
-    [body] or in [system]."""
-    scene_frame, places = tables.get("frame"), []
-
-    def plain(place: str, table):
-        if not isinstance(table, Mapping) or table.get("frame") != FITTED:
-            return table
-        places.append(place)
-        return {k: v for k, v in table.items() if k != "frame"}
-
-    tables = {
-        k: plain(k, v) if k in ("body", "system") else v
-        for k, v in plain("", tables).items()
-    }
-    if "body" in tables.get("system", {}):
-        tables["system"] = {
-            **tables["system"],
-            "body": plain("system.body", tables["system"]["body"]),
-        }
+    """Return the tables without the minimum-perturbation frame, and whether they
+    request it: above all tables, in [body], in [system] or in [system.body]."""
+    scene_frame = tables.get("frame")
+    tables = dict(tables)
+    places = []
+    if scene_frame == FITTED:
+        places.append("")
+        del tables["frame"]
+    for part in ("body", "system"):
+        if _requests_fitted(tables.get(part)):
+            places.append(part)
+            tables[part] = _without_frame(tables[part])
+    system = tables.get("system", {})
+    if _requests_fitted(system.get("body")):
+        places.append("system.body")
+        tables["system"] = {**system, "body": _without_frame(system["body"])}
     if places and scene_frame not in (None, FITTED):
         raise Refusal(
-            f"[{places[0]}] frame = {FITTED!r}, but the scene's frame = {scene_frame!r}",
+            f"[{places[0]}] frame = {FITTED!r}, but the scene's frame = "
+            f"{scene_frame!r}",
             where=name,
             instead="keep one",
         )
     return tables, bool(places)
+
+
+def _requests_fitted(table: Any) -> bool:
+    return isinstance(table, Mapping) and table.get("frame") == FITTED
+
+
+def _without_frame(table: Mapping) -> dict:
+    return {key: value for key, value in table.items() if key != "frame"}

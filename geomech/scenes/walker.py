@@ -1,4 +1,4 @@
-"""Scenes of walking: a robot, the clock of its legs and the grains it walks on."""
+"""Scenes of walking: a robot, the clock of its legs, and the grains."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, ClassVar
 
 from geomech.scenes.intruder import OUTLINES
+from geomech.scenes.intruding import check_files
 from geomech.scenes.sections import Each, Keys, OneOf
 from geomech.scenes.stress import SpatialKeys, StressKeys
 from rft.core.refusal import Refusal, formatted, located
@@ -30,22 +31,23 @@ ELSEWHERE = {
 }
 KINDS = {kind: effect for kind, effect in GROUND_EFFECTS.items() if effect.walks}
 LAWS = {"planar": StressKeys, "3d": SpatialKeys}
-OF_THREE = {
-    "xi_n",
-    "density",
-    "internal_friction",
-    "surface_friction",
-}  # keys of a [medium] of three dimensions alone
+# Keys that only a [medium] of three dimensions has.
+SPATIAL_KEYS = {"xi_n", "density", "internal_friction", "surface_friction"}
 LEGS = {"legs": OUTLINES}
 SCREW = {"screw": OneOf({"screw": Screw}, implied=("screw",))}
-LAW = "stress maps of the vertical plane, or the law of three dimensions, for the engine mujoco; if left out what the keys tell"
+LAW = (
+    "stress maps of the vertical plane, or the law of three dimensions, for the engine "
+    "mujoco; if left out what the keys tell"
+)
 OWNER = "a robot that walks"
 
 
 @dataclass(frozen=True)
 class WalkerScene:
-    """A stress map or a law of three dimensions, a robot and its gait, and effects on the ground. numerics: how finely. text:
-    its TOML. files: those that the scene names.
+    """A stress map or a law of three dimensions, a robot and its gait, and effects on
+    the ground.
+
+    numerics: how finely it is computed. text: its TOML. files: that the scene names.
 
     Examples
     --------
@@ -81,51 +83,41 @@ class WalkerScene:
     def __post_init__(self):
         with located(self.name):
             for name, kind in (("numerics", Fineness), ("name", str), ("text", str)):
-                if not isinstance(getattr(self, name), kind):
-                    raise Refusal(
-                        f"{name} must be {kind.__name__}", value=getattr(self, name)
-                    )
-            if not (
-                isinstance(self.files, tuple)
-                and all(isinstance(x, str) for x in self.files)
-            ):
-                raise Refusal("files must be a tuple of names", value=self.files)
+                value = getattr(self, name)
+                if not isinstance(value, kind):
+                    raise Refusal(f"{name} must be {kind.__name__}", value=value)
+            check_files(self.files)
             object.__setattr__(self, "effects", self.walker.effects)
             self.robot.check(self.numerics.elements)
 
     @property
     def engine(self) -> str:
         """The engine that computes it by default."""
-        spatial = isinstance(self.robot, Mjcf | Screws) or isinstance(
-            self.medium, Spatial
-        )
-        return self.numerics.engine or ("mujoco" if spatial else "planar")
+        if self.numerics.engine:
+            return self.numerics.engine
+        if isinstance(self.robot, Mjcf | Screws) or isinstance(self.medium, Spatial):
+            return "mujoco"
+        return "planar"
 
     @property
     def walker(self) -> Walker:
         return Walker(self.robot, self.gait, self.medium, self.effects)
 
 
-def spelled_out(tables: Mapping, name: str) -> dict:
-    """Return the tables of a scene with the names that they omit: those of the robot's kind, its screw, and the law."""
+def with_implied_names(tables: Mapping, name: str) -> dict:
+    """Return the tables of a scene with the names that they omit: the kinds of the
+    robot and its screw, and the law."""
+    _refuse_slope(tables, name)
     tables = {
         key: dict(table) if isinstance(table, Mapping) else table
         for key, table in tables.items()
     }
-    for section, table in tables.items():
-        keys = table if isinstance(table, Mapping) else (section,)
-        if {"slope", "slope_deg"} & {*keys}:
-            place = f"[{section}] slope" if isinstance(table, Mapping) else "slope"
-            raise Refusal(
-                place,
-                where=name,
-                because="a walking scene has level ground",
-                instead=ELSEWHERE["slope"],
-            )
-    medium, robot = (
-        tables.get(key) if isinstance(tables.get(key), dict) else {}
-        for key in ("medium", "robot")
-    )
+    medium = tables.get("medium")
+    if not isinstance(medium, dict):
+        medium = {}
+    robot = tables.get("robot")
+    if not isinstance(robot, dict):
+        robot = {}
     if "mjcf" in robot and robot.setdefault("kind", "mjcf") != "mjcf":
         raise Refusal(
             "[robot]",
@@ -135,7 +127,23 @@ def spelled_out(tables: Mapping, name: str) -> dict:
         )
     if isinstance(robot.get("screw"), Mapping):
         robot["screw"] = {"kind": "screw", **robot["screw"]}
-    if medium is not None:
-        spatial = {*medium} & OF_THREE or robot.get("kind") == "screws"
-        medium.setdefault("law", "3d" if spatial else "planar")
+    is_spatial = {*medium} & SPATIAL_KEYS or robot.get("kind") == "screws"
+    medium.setdefault("law", "3d" if is_spatial else "planar")
     return tables
+
+
+def _refuse_slope(tables: Mapping, name: str) -> None:
+    """Raise Refusal for a slope of the ground, in any section or above all of them."""
+    for section, table in tables.items():
+        keys = {section}
+        place = "slope"
+        if isinstance(table, Mapping):
+            keys = {*table}
+            place = f"[{section}] slope"
+        if {"slope", "slope_deg"} & keys:
+            raise Refusal(
+                place,
+                where=name,
+                because="a walking scene has level ground",
+                instead=ELSEWHERE["slope"],
+            )

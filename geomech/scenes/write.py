@@ -11,11 +11,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from geomech.gaits import Circle, Gait
-from geomech.scenes.key import angles_of
+from geomech.scenes.key import angles_of, key_fields
 from geomech.scenes.medium import MEDIUM
 from geomech.scenes.model import SWIMMER, Scene, checked_scene
 from geomech.scenes.read import from_tables
-from geomech.scenes.sections import Each, Keys, Section, sections_of, variants
+from geomech.scenes.sections import (
+    Each,
+    Keys,
+    Section,
+    Variant,
+    sections_of,
+    variants,
+)
 from geomech.systems.base import unwrapped
 from geomech.systems.capabilities import solver_of
 from geomech.systems.framed import Framed
@@ -27,40 +34,51 @@ if TYPE_CHECKING:
     from geomech.scenes.intruding import Intruding
     from geomech.scenes.walker import WalkerScene
 
+COMMENT_WIDTH = 110  # characters of a line of comments, without the mark
+
 
 def toml(scene: Scene | Intruding | WalkerScene) -> str:
-    """Return the text that the scene was read from where it is valid by itself and in any folder, comments and all;
-    else a new one, which spells out a medium that came from a file, and names other files with their folders. Refusal
-    if it has a part that no scene file can name.
+    """Return a scene as a TOML text that is valid by itself and in any folder.
+
+    It is the text from which the scene was read, with its comments, if that is valid by
+    itself; else a new one, with the law and numbers of a medium that came from a file,
+    and the folders of other files. Refusal if the scene has a part that no scene file
+    can name.
 
     Examples
     --------
     >>> import geomech
-    >>> scene = geomech.study(geomech.media.Viscous(3.0), geomech.bodies.Chain(), geomech.gaits.Circle(0.5)).scene
+    >>> medium = geomech.media.Viscous(3.0)
+    >>> gait = geomech.gaits.Circle(0.5)
+    >>> scene = geomech.study(medium, geomech.bodies.Chain(), gait).scene
     >>> print(geomech.toml(scene).partition("[body]")[0].strip())
     [medium]
     law = "viscous"
     ratio = 3.0
     """
-    self_contained = not isinstance(_checked(scene), Scene) or not (
-        scene.files or _names_relative_file(tomllib.loads(scene.text))
+    tables = tomllib.loads(_checked(scene).text)
+    needs_files = isinstance(scene, Scene) and (
+        scene.files or _names_relative_file(tables)
     )
-    if (
-        scene.text
-        and self_contained
-        and from_tables(tomllib.loads(scene.text), scene.name, scene.text) == scene
-    ):
+    if scene.text and not needs_files and _describe(tables, scene):
         return scene.text
     return text_of(_written_tables(scene))
 
 
+def _describe(tables: dict, scene: Scene | Intruding | WalkerScene) -> bool:
+    """Return whether tables describe a scene as it is now."""
+    return from_tables(tables, scene.name, scene.text) == scene
+
+
 def _checked(scene: Scene | Intruding | WalkerScene) -> Scene | Intruding | WalkerScene:
     """Return a scene of any kind; Refusal if it is none."""
-    return scene if hasattr(type(scene), "example") else checked_scene(scene)
+    if hasattr(type(scene), "example"):
+        return scene
+    return checked_scene(scene)
 
 
 def _names_relative_file(tables: dict) -> bool:
-    """Return whether tables name a file by its place relative to the scene's own."""
+    """Return whether tables name a file by a path relative to the scene's own."""
     files = [tables.get(place, {}).get("file", "") for place in ("gait", "system")]
     return any(file and not Path(file).is_absolute() for file in files)
 
@@ -76,38 +94,40 @@ def gait_table(gait: Gait) -> dict:
 
 
 def medium_toml(name: str, entry) -> str:
-    """Return the table of a medium of the catalogue (`rft.laws.catalogue.Entry`), with its source above."""
-    lines = textwrap.wrap(f"{name}: {entry.source}", 110)
+    """Return the table of a medium of the catalogue (`rft.laws.catalogue.Entry`), with
+    its source in comments above."""
+    lines = textwrap.wrap(f"{name}: {entry.source}", COMMENT_WIDTH)
     if entry.axial_stress is not None:
         lines.append(
-            f"axial drag over projected area at 7.62 cm depth: {entry.axial_stress:g} Pa"
+            "axial drag over projected area at 7.62 cm depth: "
+            f"{entry.axial_stress:g} Pa"
         )
-    angles = [
-        f"{x} = {math.degrees(getattr(entry.medium, x)):.6g} degrees"
-        for x in sorted(angles_of(type(entry.medium)))
-    ]
-    head = "".join(f"# {line}\n" for line in [*lines, *angles])
-    return head + table("medium", _section(entry.medium, MEDIUM))
+    for key in sorted(angles_of(type(entry.medium))):
+        degrees = math.degrees(getattr(entry.medium, key))
+        lines.append(f"{key} = {degrees:.6g} degrees")
+    return _comments(lines) + table("medium", _section(entry.medium, MEDIUM))
 
 
 def vertical_toml(name: str, entry) -> str:
-    """Return the table of a medium of intruder scenes (`rft.terradynamics.plates.VerticalEntry`), with its source above."""
-    head = "".join(
-        f"# {line}\n" for line in textwrap.wrap(f"{name}: {entry.source}", 110)
-    )
+    """Return the table of a medium of intruder scenes
+    (`rft.terradynamics.plates.VerticalEntry`), with its source in comments above."""
     from rft.terradynamics.plates.stress import COEFFICIENTS
 
+    lines = textwrap.wrap(f"{name}: {entry.source}", COMMENT_WIDTH)
+    lines.append("coefficients in N/cm^3, times zeta")
     stress = dataclasses.asdict(entry.stress)
-    values = {
-        **{key.replace("m", "-"): stress[key] for key in COEFFICIENTS},
-        "zeta": stress["zeta"],
-    }
-    return f"{head}# coefficients in N/cm^3, times zeta\n{table('medium', values)}"
+    values = {key.replace("m", "-"): stress[key] for key in COEFFICIENTS}
+    values["zeta"] = stress["zeta"]
+    return _comments(lines) + table("medium", values)
+
+
+def _comments(lines: list[str]) -> str:
+    return "".join(f"# {line}\n" for line in lines)
 
 
 def tables(scene: Scene | Intruding | WalkerScene) -> dict:
-    """Return the tables of a scene's text, with its present numerics, where these make the scene; else newly written
-    ones.
+    """Return the tables of a scene: those of its text, with its present numerics, if
+    they describe it; else new ones.
 
     Examples
     --------
@@ -118,23 +138,17 @@ def tables(scene: Scene | Intruding | WalkerScene) -> dict:
     read = tomllib.loads(_checked(scene).text)
     if isinstance(scene, Scene):
         read["numerics"] = _numerics(scene)
-    self_contained = not (
-        isinstance(scene, Scene) and scene.files
-    )  # whose medium can be swept only where it stands
-    return (
-        read
-        if scene.text
-        and self_contained
-        and from_tables(read, scene.name, scene.text) == scene
-        else _written_tables(scene)
-    )
+    # A medium from a file can be swept only if the scene itself has its numbers.
+    needs_files = isinstance(scene, Scene) and scene.files
+    if scene.text and not needs_files and _describe(read, scene):
+        return read
+    return _written_tables(scene)
 
 
 def without_gait(scene: Scene, spell_out: bool = False) -> dict:
-    """Return the tables of a scene but for its gait, which hold in any folder: those of
-    its text where these do, else newly written ones. Refusal if no file can name one of
-    its parts; the gait may be one that none can. spell_out: the medium by its law and
-    parameters, in place of its name.
+    """Return the tables of a scene without its gait, valid in any folder: those of its
+    text if they are, else new ones. Refusal if no file can name one of its parts, other
+    than the gait. spell_out: replace the name of the medium by its law and parameters.
 
     Examples
     --------
@@ -146,90 +160,96 @@ def without_gait(scene: Scene, spell_out: bool = False) -> dict:
     stand_in = Circle(frequency=getattr(checked_scene(scene).gait, "frequency", None))
     plain = scene.changed(gait=stand_in)
     read = tomllib.loads(scene.text) | {"gait": gait_table(stand_in)}
-    holds = (
-        scene.text
-        and not (scene.files or _names_relative_file(read))
-        and from_tables(read, scene.name, scene.text) == plain
-    )
-    found = read if holds else _written_tables(plain)
+    needs_files = scene.files or _names_relative_file(read)
+    if scene.text and not needs_files and _describe(read, plain):
+        tables = read
+    else:
+        tables = _written_tables(plain)
     if spell_out:
-        found = spelled_out(found, scene)
-    return {name: table for name, table in found.items() if name != "gait"}
+        tables = with_law(tables, scene)
+    return {name: table for name, table in tables.items() if name != "gait"}
 
 
-def spelled_out(tables: dict, scene: Scene) -> dict:
-    """Return the scene's tables with the law and its parameters in place of the name of its medium."""
+def with_law(tables: dict, scene: Scene) -> dict:
+    """Return the scene's tables with the law and its parameters in place of the name of
+    its medium."""
     if "name" not in tables.get("medium", {}):
         return tables
     return {**tables, "medium": _section(scene.system.medium, MEDIUM)}
 
 
 def _written_tables(scene: Scene | Intruding | WalkerScene) -> dict:
-    """Return the tables that a scene's parts make; Refusal if a file cannot name one of them."""
+    """Return the tables of a scene's parts; Refusal if a file cannot name one of
+    them."""
     with located(scene.name):
-        out = {}
+        tables = {}
         for name, (section, *_) in sections_of(type(scene)).items():
-            part = getattr(
-                scene, name, scene
-            )  # the scene itself where its own fields are keys
-            if table := section_tables(_named(part), section):
-                out[name] = table
+            # A section without a field of its own has fields of the scene as keys.
+            part = getattr(scene, name, scene)
+            table = section_tables(_nameable(part), section)
+            if table:
+                tables[name] = table
         if isinstance(scene, Scene):
-            out = _short(out, scene)
-        if from_tables(out, scene.name) != scene:
+            tables = _shortened(tables, scene)
+        if from_tables(tables, scene.name) != scene:
             raise Refusal(
                 "a part of this scene is of no kind that a scene file can name"
             )
-        return out
+        return tables
 
 
 def section_tables(part: Any, section: Section) -> dict | list[dict]:
-    """Return the table of a section, or the tables of one for each part; Refusal if no file can name the part."""
-    return (
-        [_section(each, section) for each in part]
-        if isinstance(section, Each)
-        else _section(part, section)
-    )
+    """Return the table of a section, or a list of tables if the section is one for each
+    part; Refusal if no file can name the part."""
+    if isinstance(section, Each):
+        return [_section(each, section) for each in part]
+    return _section(part, section)
 
 
 def _section(part: Any, section: Section) -> dict:
     for variant in variants(section):
-        is_one = type(part) is getattr(variant.kind, "makes", variant.kind)
-        if is_one and not (variant.file and not variant.file.keys):
-            parts = {
-                field: (getattr(part, field), one)
-                for field, one in variant.inner.items()
-            }
-            inner = {
-                field: section_tables(*each)
-                for field, each in parts.items()
-                if each[0] is not None
-            }
-            return {**variant.named, **_fields(part, variant.kind), **inner}
-        if is_one or isinstance(section, Keys):
+        fits = type(part) is getattr(variant.kind, "makes", variant.kind)
+        is_from_file = variant.file and not variant.file.keys
+        if fits and not is_from_file:
+            return _variant_table(part, variant)
+        if fits or isinstance(section, Keys):
             raise Refusal(
                 f"a {type(part).__name__} has a CSV file of its own",
                 instead="write the scene that names it by hand",
             )
-    reason = (
-        f"a {name_in(section.kinds, part)} is of no kind that a scene file can name"
+    kind = name_in(section.kinds, part)
+    raise Refusal(
+        f"a {kind} is of no kind that a scene file can name",
+        instead=f"use one of {', '.join(section.kinds)}",
     )
-    raise Refusal(reason, instead=f"use one of {', '.join(section.kinds)}")
 
 
-def _short(tables: dict, scene: Scene) -> dict:
-    """Return tables with a swimmer's parts in place of [system], and once the values that apply to the whole scene."""
-    system, effects = tables.pop("system"), []
-    if isinstance(_named(scene.system), Swimmer):
-        tables = {part: system[part] for part in SWIMMER if system[part]} | tables
+def _variant_table(part: Any, variant: Variant) -> dict:
+    """Return the table of a part of a kind, with the tables within it."""
+    table = {**variant.named, **_keys(part, variant.kind)}
+    for field, section in variant.inner.items():
+        inner_part = getattr(part, field)
+        if inner_part is not None:
+            table[field] = section_tables(inner_part, section)
+    return table
+
+
+def _shortened(tables: dict, scene: Scene) -> dict:
+    """Return tables with the parts of a swimmer in place of [system]. Values that apply
+    to the whole scene appear once."""
+    system = tables.pop("system")
+    effects = []
+    if isinstance(_nameable(scene.system), Swimmer):
+        parts = {part: system[part] for part in SWIMMER if system[part]}
+        tables = parts | tables
         effects = tables.get("effects", [])
     else:
         tables = {"system": system} | tables
     for part in ("body", "system"):
-        if (
-            "frame" in tables.get(part, {}) and tables[part].get("kind") != Table.kind
-        ):  # which has its file's otherwise
-            del tables[part]["frame"]
+        table = tables.get(part, {})
+        # A table keeps its frame: without one it would have that of its file.
+        if "frame" in table and table.get("kind") != Table.kind:
+            del table["frame"]
             if scene.frame != "mean":
                 tables = {"frame": scene.frame} | tables
     if "frequency" in tables["gait"]:
@@ -238,66 +258,69 @@ def _short(tables: dict, scene: Scene) -> dict:
     return tables | {"numerics": _numerics(scene)}
 
 
-def _named(part: Any) -> Any:
-    """Return the object inside a system that a scene file can name."""
+def _nameable(part: Any) -> Any:
+    """Return the object inside a part that a scene file can name."""
     if isinstance(part, Framed):
-        return _named(part.inner)
+        return _nameable(part.inner)
     return unwrapped(part)
 
 
 def _numerics(scene: Scene) -> dict:
-    parts = [scene.numerics, solver_of(scene.system)]
-    return {
-        key: value
-        for part in parts
-        if part
-        for key, value in _fields(part, type(part)).items()
-    }
+    """Return [numerics]: the keys of the tiers, and those of the system's solver."""
+    keys = _keys(scene.numerics, type(scene.numerics))
+    solver = solver_of(scene.system)
+    if solver:
+        keys |= _keys(solver, type(solver))
+    return keys
 
 
-def _fields(part: Any, kind: type) -> dict:
+def _keys(part: Any, kind: type) -> dict:
     """Return the keys of a class, as in a file, for which a part has a value."""
-    keys = [f.name for f in dataclasses.fields(kind) if f.init and f.name != "solver"]
-    return {
-        name: _plain(value)
-        for name in keys
-        if (value := getattr(part, name, None)) is not None
-    }
+    keys = {}
+    for field in key_fields(kind):
+        value = getattr(part, field.name, None)
+        if value is not None:
+            keys[field.name] = _plain(value)
+    return keys
 
 
-def _plain(value):
-    """Return NumPy's numbers and rows as Python's own."""
+def _plain(value: Any) -> Any:
+    """Return NumPy's numbers and arrays as Python's numbers and lists."""
     if hasattr(value, "tolist"):
         value = value.tolist()
-    return [_plain(x) for x in value] if isinstance(value, (tuple, list)) else value
+    if isinstance(value, (tuple, list)):
+        return [_plain(x) for x in value]
+    return value
 
 
 def text_of(tables: dict) -> str:
     """Return the tables of a scene as TOML."""
+    # Keys above all tables come first, as TOML would take them for keys of a table.
     lines = [
         f"{key} = {_value(x)}"
         for key, x in tables.items()
         if not isinstance(x, (dict, list))
     ]
     for name, table in tables.items():
-        for each in (
-            table
-            if isinstance(table, list)
-            else [table]
-            if isinstance(table, dict)
-            else []
-        ):
-            lines += ["", f"[[{name}]]" if isinstance(table, list) else f"[{name}]"]
-            lines += [f"{key} = {_value(x)}" for key, x in each.items()]
+        if isinstance(table, dict):
+            lines += _table_lines(f"[{name}]", table)
+        elif isinstance(table, list):
+            for each in table:
+                lines += _table_lines(f"[[{name}]]", each)
     return "\n".join(lines).lstrip("\n") + "\n"
 
 
-def _value(x) -> str:
-    """Return a value as TOML; its strings and lists are JSON's, its numbers Python's."""
+def _table_lines(header: str, table: dict) -> list[str]:
+    return ["", header, *(f"{key} = {_value(x)}" for key, x in table.items())]
+
+
+def _value(x: Any) -> str:
+    """Return a value as TOML: strings and lists as in JSON, numbers as in Python."""
     if isinstance(x, list):
         return f"[{', '.join(map(_value, x))}]"
     if isinstance(x, dict):
-        return f"{{ {', '.join(f'{key} = {_value(y)}' for key, y in x.items())} }}"
+        entries = ", ".join(f"{key} = {_value(y)}" for key, y in x.items())
+        return f"{{ {entries} }}"
     if isinstance(x, (str, bool)):
         # TOML allows no DEL as it is, JSON does
         return json.dumps(x, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -65,7 +65,7 @@ def rod_fit(
 
 def _fit(
     law: str,
-    measured: drag.Measured,
+    measured: drag.RodDrag,
     sizes: Mapping[str, float],
     end_caps: float | str,
 ) -> Fit:

@@ -40,7 +40,7 @@ class Cycles:
         """Return the grid; amplitudes of one scene make one batch. Refusal if a corner makes no scene."""
         tables_ = written.tables(checked_scene(scene))
         if any(name.startswith("medium.") for name in over):
-            tables_ = written.spelled_out(tables_, scene)
+            tables_ = written.with_law(tables_, scene)
         grid = Grid(scene, over, tables_, AMPLITUDE, _idle(scene, over))
         for corner in grid.corners():
             corner_scene = grid.at(corner)

@@ -1,5 +1,7 @@
-"""Tables of a connection in files, a format each: NetCDF, and MATLAB files in sysplotter's layout. What is read is always
-checked."""
+"""Tables of a connection in files: NetCDF, and MATLAB files in sysplotter's layout.
+
+Each format has a module. Everything read from a file is checked.
+"""
 
 from geomech.io.tables.base import FORMATS, LAYOUTS, ORDERS, SIGNS, Stored, scaled
 from geomech.io.tables.frames import in_frame

@@ -18,42 +18,48 @@ from geomech.geometry.tube import Tube
 from rft.core.refusal import Refusal, printable
 from rft.core.registry import Registry, functions_with
 
-LONGEST_NAME = 60  # characters of what a file calls a frame, or a shape variable
+LONGEST_NAME = 60  # characters of the name of a frame, or of a shape variable
 MINIMUM_PERTURBATION = "minimum-perturbation"
-UNKNOWN_FRAME = "that of the table"  # of a file that does not say it
-LARGEST_ANGLE = (
-    10 * np.pi
-)  # rad of a shape variable, a joint angle or a bend; beyond it is taken for degrees
+UNKNOWN_FRAME = "that of the table"  # of a file that states none
+LARGEST_ANGLE = 10 * np.pi  # rad of a shape variable; degrees are suspected beyond it
 LARGEST_ENTRY = 1e9  # of A, body lengths or m or rad per rad
 SIGNS = {"+": "xi = + A alphadot", "-": "xi = - A alphadot"}
-BODY = ("lengths", "frame", "modes", "waves")  # what files say of a chain of links
+BODY = ("lengths", "frame", "modes", "waves")  # the keys of a chain of links in a file
 LAYOUTS = ("arrays", "struct")
 ORDERS = ("ndgrid", "meshgrid")
-# Readers, parse(raw, sign, order, sha256) -> Stored. Their attributes: suffix; write, a function of (path, result, **settings),
-# where a result as of `geomech.studies.fields.of_study` can be written; settings, names of those that it takes ("sign",
-# "order", "layout"); joints, the only number that it takes; whole, False where it takes no more than A, what is known of its
-# error, and a quadratic metric.
+# Readers, functions parse(raw, sign, order, sha256) -> Stored. Their attributes:
+#   suffix    of the files' names
+#   write     where results can be written: a function (path, result, **settings) of a
+#             result of `geomech.studies.fields`
+#   settings  the names of its settings, of "sign", "order" and "layout"
+#   joints    the only number of joints that it takes, if there is one
+#   whole     False where it takes A, its error and a quadratic metric alone
 FORMATS = Registry(
     "geomech.formats", "suffix", "a file format", functions_with("suffix")
 )
 ROWS = ("x", "y", "theta")
 ROUNDING = 1e-9  # of the largest velocity: a displacement below it has no sign
+MIRROR_SIGNS = np.array([-1.0, 1.0, 1.0])  # signs of the rows of A in a mirror
 
 
 @dataclass(frozen=True, eq=False)
 class Stored:
-    """A connection read from a file, converted to xi = + A alphadot and to axes (alpha_1, alpha_2, ...).
+    """A connection read from a file, converted to xi = + A alphadot and to axes
+    (alpha_1, alpha_2, ...).
 
-    harmonics: the odd harmonics of xi, where the file has them. even: (3, N_1, ...), rms of xi(alphadot) +
-    xi(-alphadot), if that is not 0. metric: of shape space, where the file has it, in body lengths; power is its norm
-    to power_degree. length: of the body, in ``unit``, "BL" or "m". frame: of xi, in words. sign, order: as in the file.
-    assumptions: facts inferred because the file does not state them. sha256: of the file. shapes: names of the shape
-    variables, alpha_k where the file has none. A_error: (3, d, N_1, ...), half widths of intervals of A, which cover it
-    in a share ``level`` of cases, where the file has them. sized: whether the file states length and unit; body lengths
-    are assumed where it does not. body: the chain that the table is of, as arguments of `rft.Chain`, where the file
-    says it; its frame is the one in which A is, unless ``frame`` is another.
-    computed: what another program computed of the table (`geomech.io.tables.sysplotter.Computed`), in the file's frame,
-    where the file has it.
+    harmonics: the odd harmonics of xi, where the file has them. even: (3, N_1, ...),
+    rms of xi(alphadot) + xi(-alphadot), if that is not 0. metric: of shape space, where
+    the file has it, in body lengths; power is its norm to power_degree. length: of the
+    body, in ``unit``, "BL" or "m". frame: of xi, in words. sign, order: as in the file.
+    assumptions: facts inferred because the file does not state them. sha256: of the
+    file. shapes: names of the shape variables, alpha_k where the file has none.
+    A_error: (3, d, N_1, ...), half widths of intervals of A, which cover it in a share
+    ``level`` of cases, where the file has them. sized: whether the file states length
+    and unit; body lengths are assumed where it does not. body: the chain of the table,
+    as arguments of `rft.Chain`, where the file has it; its frame is the one of A,
+    unless ``frame`` is another. computed: what another program computed from the table
+    (`geomech.io.tables.sysplotter.Computed`), in the file's frame, where the file has
+    it.
     """
 
     connection: Connection
@@ -76,9 +82,8 @@ class Stored:
     computed: Any = None
 
     def __post_init__(self):
-        object.__setattr__(
-            self, "frame", printable(" ".join(self.frame.split()))[:LONGEST_NAME]
-        )
+        frame = printable(" ".join(self.frame.split()))[:LONGEST_NAME]
+        object.__setattr__(self, "frame", frame)
 
     @property
     def table(self) -> Connection | Harmonics:
@@ -97,48 +102,73 @@ class Stored:
 
     @cached_property
     def halves(self) -> tuple[Connection | Harmonics, ...]:
-        """`table` on every second point of each axis, from the first and from the second, with both ends kept."""
+        """`table` on every second point of each axis, from the first and from the
+        second; both have the ends of the axes."""
         return self.table.half(0), self.table.half(1)
 
     @cached_property
     def mirror(self) -> bool:
-        """Whether left and right are alike: A_x even, A_y and A_theta of A odd times odd, to rounding."""
+        """Whether left and right are symmetric, to rounding: A_x(-alpha) = -A_x(alpha),
+        and A_y and A_theta are even."""
         c = self.connection
         if not all(np.allclose(a, -a[::-1], rtol=0, atol=1e-12) for a in c.axes):
             return False
-        mirrored = np.flip(c.A, tuple(range(2, c.A.ndim))) * np.array(
-            [-1.0, 1.0, 1.0]
-        ).reshape(3, 1, *[1] * len(c.axes))
+        signs = MIRROR_SIGNS.reshape(3, 1, *[1] * len(c.axes))
+        mirrored = signs * np.flip(c.A, tuple(range(2, c.A.ndim)))
         return bool(np.abs(mirrored - c.A).max() <= 1e-9 * np.abs(c.A).max())
 
 
 def scaled(stored: Stored, factor: float) -> Stored:
-    """Return the table with all lengths times ``factor``, then in the unit that ``stored`` has."""
+    """Return the table with all lengths times ``factor``; its unit stays."""
     if factor == 1.0 and stored.sized:
         return stored
-    by = np.array([factor, factor, 1.0])
-    times = lambda x: x * by.reshape(3, *[1] * (x.ndim - 1))
-    c, h = stored.connection, stored.harmonics
-    size = {"unit": stored.unit, "length": stored.length}
+    by_row = np.array([factor, factor, 1.0])
+
+    def times(values):
+        return values * by_row.reshape(3, *[1] * (values.ndim - 1))
+
+    c = stored.connection
+    size: dict[str, Any] = {"unit": stored.unit, "length": stored.length}
     if isinstance(c, Tube):
-        series = {
-            name: times(getattr(c.taylor, name))
-            for name in ("A", "slope", "beyond", "standard_error")
-        }
+        series = c.taylor
         size["taylor"] = replace(
-            c.taylor, errors=c.taylor.errors * by[:, None, None, None], **series
+            series,
+            A=times(series.A),
+            slope=times(series.slope),
+            errors=series.errors * by_row[:, None, None, None],
+            beyond=times(series.beyond),
+            standard_error=times(series.standard_error),
         )
-    c = type(c)(c.axes, times(c.A), times(c.residual), times(c.speed), c.degree, **size)
-    h = h and Harmonics(h.axes, times(h.coefficients), times(h.residual), h.degree)
-    even, error = (x if x is None else times(x) for x in (stored.even, stored.A_error))
-    return replace(stored, connection=c, harmonics=h, even=even, A_error=error)
+    connection = type(c)(
+        c.axes, times(c.A), times(c.residual), times(c.speed), c.degree, **size
+    )
+    harmonics = stored.harmonics
+    if harmonics:
+        harmonics = Harmonics(
+            harmonics.axes,
+            times(harmonics.coefficients),
+            times(harmonics.residual),
+            harmonics.degree,
+        )
+    even = stored.even
+    if even is not None:
+        even = times(even)
+    error = stored.A_error
+    if error is not None:
+        error = times(error)
+    return replace(
+        stored, connection=connection, harmonics=harmonics, even=even, A_error=error
+    )
+
+
+# Checks of what files have.
 
 
 def checked_axis(
     name: str, values: np.ndarray, largest: float = LARGEST_ANGLE
 ) -> np.ndarray:
-    """Return values (N,) as ascending angles; Refusal if they are none."""
-    axis = numbers(name, values)
+    """Return values (N,) as ascending angles, rad; Refusal if they are none."""
+    axis = checked_numbers(name, values)
     if axis.ndim != 1 or len(axis) < 4 or not (np.diff(axis) > 0).all():
         raise Refusal(
             "has no grid", instead=f"{name} must be at least 4 ascending angles in rad"
@@ -151,132 +181,143 @@ def checked_axis(
     return axis
 
 
-def checked_names(names, defaults: list[str]) -> tuple[str, ...]:
-    """Return names of shape variables from a file, or ``defaults`` where they make no sense."""
-    words = (
-        isinstance(names, list)
-        and all(isinstance(x, str) for x in names)
-        and len({*names}) == len(defaults)
-    )
-    good = words and all(
-        x.isprintable() and 0 < len(x) <= LONGEST_NAME and "$" not in x for x in names
-    )
-    return tuple(names if good else defaults)
+def checked_names(names: Any, defaults: list[str]) -> tuple[str, ...]:
+    """Return names of shape variables from a file, or ``defaults`` where they make no
+    sense."""
+    if not isinstance(names, list) or not all(isinstance(x, str) for x in names):
+        return tuple(defaults)
+    is_distinct = len({*names}) == len(defaults)
+    if is_distinct and all(_is_name(x) for x in names):
+        return tuple(names)
+    return tuple(defaults)
 
 
-def numbers(name: str, values) -> np.ndarray:
-    """Return values as floats in the machine's order of bytes; Refusal if they are none, or not finite."""
+def _is_name(text: str) -> bool:
+    # A $ would begin a formula in the labels of figures.
+    return text.isprintable() and 0 < len(text) <= LONGEST_NAME and "$" not in text
+
+
+def is_real_number(value: Any) -> bool:
+    """Return whether an attribute of a file is one real number."""
+    return np.ndim(value) == 0 and np.asarray(value).dtype.kind in "iuf"
+
+
+def checked_numbers(name: str, values: Any) -> np.ndarray:
+    """Return values as floats in the machine's order of bytes; Refusal if they are no
+    numbers, not finite, or too large."""
     array = np.asarray(values)
     if array.dtype.kind not in "iuf":
         raise Refusal(f"has {name} that is no array of real numbers")
     array = array.astype(float)
-    if not np.isfinite(array).all():
+    is_bad = ~np.isfinite(array)
+    if is_bad.any():
         raise Refusal(
-            f"has {name} that is not finite (nan or inf) at {_first(~np.isfinite(array))}",
+            f"has {name} that is not finite (nan or inf) at {_first_index(is_bad)}",
             instead="mend it",
         )
-    if np.abs(array).max(initial=0.0) > LARGEST_ENTRY:
+    is_large = np.abs(array) > LARGEST_ENTRY
+    if is_large.any():
         raise Refusal(
-            f"has {name} above {LARGEST_ENTRY:g} at {_first(np.abs(array) > LARGEST_ENTRY)}",
+            f"has {name} above {LARGEST_ENTRY:g} at {_first_index(is_large)}",
             instead="mend it",
         )
     return array
 
 
-def masks(
+def _first_index(found: np.ndarray) -> str:
+    return "index (" + ", ".join(map(str, np.argwhere(found)[0])) + ")"
+
+
+def check_mask(
     name: str, values: np.ndarray, masked: np.ndarray, attributes: Mapping
 ) -> None:
-    """Raise Refusal where values (..., N_1, ...) are nan elsewhere than at ``masked`` shapes (N_1, ...), or not at all
-    of them. The file must have singular shapes among its ``attributes``."""
+    """Raise Refusal unless values (..., N_1, ...) are nan at all ``masked`` shapes
+    (N_1, ...) and nowhere else. A file with such shapes must declare them, by
+    ``singular_shapes`` among its ``attributes``."""
     if masked.any() and "singular_shapes" not in attributes:
-        numbers(name, values)
+        checked_numbers(name, values)
     if not np.isnan(values[..., masked]).all():
         raise Refusal(
             f"has {name} at singular shapes, where A is nan", instead="write it anew"
         )
-    numbers(name, np.where(masked, 0.0, values))
+    checked_numbers(name, np.where(masked, 0.0, values))
 
 
 def checked_error(
     name: str, error: np.ndarray, A: np.ndarray, attributes: Mapping
 ) -> np.ndarray:
-    """Return half widths of intervals of A, both (3, d, N_1, ...) and nan at the same shapes; Refusal otherwise."""
+    """Return half widths of intervals of A, both (3, d, N_1, ...) and nan at the same
+    shapes; Refusal otherwise."""
     if error.shape != A.shape:
         raise Refusal(f"has {name} of shape {error.shape} where A has {A.shape}")
-    masks(name, error, np.isnan(A).any((0, 1)), attributes)
+    check_mask(name, error, np.isnan(A).any((0, 1)), attributes)
     if (error < 0).any():
         raise Refusal(f"has {name} below 0 where it is half of an interval of A")
     return error.astype(float)
 
 
 def body_text(body: Any) -> str:
-    """Return a chain of links, and the frame in which A is, as the text that files have; "" for another body."""
-    body = (
-        {key: getattr(body, key) for key in BODY}
-        if getattr(body, "kind", "") == "chain"
-        else body
-    )
-    return (
-        json.dumps({k: x for k, x in body.items() if x is not None})
-        if isinstance(body, Mapping)
-        else ""
-    )
+    """Return a chain of links, and the frame of its A, as the text that files have;
+    "" for another body. body: a chain, or its arguments as a dict."""
+    if getattr(body, "kind", "") == "chain":
+        body = {key: getattr(body, key) for key in BODY}
+    if not isinstance(body, Mapping):
+        return ""
+    return json.dumps({key: x for key, x in body.items() if x is not None})
 
 
 def checked_body(text: Any) -> dict | None:
-    """Return the chain of `body_text` as arguments of `rft.Chain`; None where it makes no sense."""
+    """Return the chain of `body_text` as arguments of `rft.Chain`; None where it makes
+    no sense."""
     try:
         body = json.loads(text)
     except (ValueError, TypeError, RecursionError):
         return None
-    return (
-        body
-        if isinstance(body, dict) and {"lengths", "frame"} <= {*body} <= {*BODY}
-        else None
-    )
+    if not isinstance(body, dict):
+        return None
+    return body if {"lengths", "frame"} <= {*body} <= {*BODY} else None
 
 
 def checked_level(attributes: Mapping) -> float | None:
-    """Return the share of cases that intervals cover, from a file's attributes; None where it makes no sense."""
+    """Return the share of cases that intervals cover, from a file's attributes; None
+    where it makes no sense."""
     level = attributes.get("level")
-    good = (
-        np.ndim(level) == 0 and np.asarray(level).dtype.kind in "iuf" and 0 < level < 1
-    )
-    return float(level) if good else None
-
-
-def _first(bad: np.ndarray) -> str:
-    return "index (" + ", ".join(map(str, np.argwhere(bad)[0])) + ")"
+    if is_real_number(level) and 0 < level < 1:
+        return float(level)
+    return None
 
 
 def rms(A: np.ndarray, residual: np.ndarray | None = None) -> np.ndarray:
-    """Return the rms (3, N_1, ...) of xi over uniform directions of alphadot, from A (3, d, N_1, ...) and its fit
-    residual."""
-    return np.sqrt((A**2).mean(1) + (0.0 if residual is None else residual**2))
+    """Return the rms (3, N_1, ...) of xi over uniform directions of alphadot, from A
+    (3, d, N_1, ...) and the residual of its fit (3, N_1, ...)."""
+    squares = (A**2).mean(1)
+    if residual is not None:
+        squares = squares + residual**2
+    return np.sqrt(squares)
 
 
 def detected_sign(connection: Connection) -> str:
-    """Return "+" if xi = + A alphadot, "-" if xi = - A alphadot, for a body of two joints with more drag across than
-    along.
+    """Return "+" if xi = + A alphadot, "-" if xi = - A alphadot, for a body of two
+    joints with more drag across than along.
 
-    With alpha_k the heading of link k+1 minus that of link k, a counter-clockwise circle then carries it backwards, as
-    its CCF_x is negative about the straight shape, in every frame of the body (Hatton et al., PRL 110, 078101 (2013)).
-    ValueError where both signs, or neither, would have it so."""
+    With alpha_k the heading of link k+1 minus that of link k, a counter-clockwise
+    circle then moves it backwards, as its CCF_x is negative about the straight shape,
+    in every frame of the body (Hatton et al., PRL 110, 078101 (2013)). Refusal where
+    both signs, or neither, have this effect."""
     half = min(float(a[-1] - a[0]) / 2 for a in connection.axes)
     centre = np.array([a[0] + a[-1] for a in connection.axes]) / 2
-    t, radius = (
-        2 * np.pi * np.arange(64) / 64,
-        np.array([0.3, 0.5])[:, None, None] * half,
-    )
+    t = 2 * np.pi * np.arange(64) / 64
+    radius = np.array([0.3, 0.5])[:, None, None] * half
     alpha = centre + radius * np.stack([np.cos(t), np.sin(t)], -1)
     alphadot = radius * np.stack([-np.sin(t), np.cos(t)], -1)
     xi = connection.velocity(alpha, alphadot)
     least = ROUNDING * np.abs(xi).max(initial=0.0)
-    for sign, value in (("+", 1.0), ("-", -1.0)):
-        if (displacement(value * xi)[:, 0] < -least).all() and (
-            displacement(-value * xi)[:, 0] > least
-        ).all():
-            return sign
+    x_of_plus = displacement(xi)[:, 0]
+    x_of_minus = displacement(-xi)[:, 0]
+    if (x_of_plus < -least).all() and (x_of_minus > least).all():
+        return "+"
+    if (x_of_minus < -least).all() and (x_of_plus > least).all():
+        return "-"
     raise Refusal(
         "does not tell the sign of A",
         instead="say sign = '+' for xi = + A alphadot, '-' for xi = - A alphadot",

@@ -1,8 +1,10 @@
-"""Stored tables in another body frame: one of the chain that they are of, or minimum-perturbation coordinates.
+"""Stored tables in another body frame: another one of their chain, or
+minimum-perturbation coordinates.
 
-The frame at h(alpha) in the first has xi_2 = Ad_h^-1 xi_1 + h^-1 dh/dt (`geomech.geometry.coordinates`). A and harmonics are
-exact at the grid's points. Of an rms residual, and of half widths of intervals, only the size of each component is known: they
-become |Ad_h^-1| times their old ones, an upper bound.
+In the frame whose pose in the first is h(alpha), xi_2 = Ad_h^-1 xi_1 + h^-1 dh/dt
+(`geomech.geometry.coordinates`). A and harmonics are exact at the grid's points. Of an
+rms residual, and of half widths of intervals, only the size of each component is known:
+they are multiplied by |Ad_h^-1|, which gives an upper bound.
 """
 
 from __future__ import annotations
@@ -23,28 +25,48 @@ from rft.formulas import se2
 
 
 def in_frame(stored: Stored, frame: str, chain: Any = None) -> Stored:
-    """Return the table in another frame; Refusal where nothing says which it has. chain: the body (`rft.Chain`), in the
-    table's frame, None where it is unknown."""
+    """Return the table in another frame; Refusal where the pose of that frame is
+    unknown. chain: the body (`rft.Chain`), in the table's frame; None where it is
+    unknown."""
     if frame in ("", stored.frame):
         return stored
     h, dh = _pose(stored, frame, chain)
-    carried = np.moveaxis(
-        se2.adjoint(se2.inverse(h)), (-2, -1), (0, 1)
-    )  # (3, 3, N_1, ...)
-    bound = lambda x: (
-        None if x is None else np.einsum("ij...,j...->i...", np.abs(carried), x)
-    )
-    c, residual = stored.connection, bound(stored.connection.residual)
-    A = np.moveaxis(
-        change_connection(np.moveaxis(c.A, (0, 1), (-2, -1)), h, dh), (-2, -1), (0, 1)
-    )
+    adjoint = np.moveaxis(se2.adjoint(se2.inverse(h)), (-2, -1), (0, 1))
+
+    def bound(sizes):
+        """Return bounds (3, ...) of components from bounds in the first frame."""
+        return np.einsum("ij...,j...->i...", np.abs(adjoint), sizes)
+
+    c = stored.connection
+    matrices = change_connection(np.moveaxis(c.A, (0, 1), (-2, -1)), h, dh)
+    A = np.moveaxis(matrices, (-2, -1), (0, 1))
+    residual = bound(c.residual)
+    speed = rms(A, np.nan_to_num(residual))
+    connection = Connection(c.axes, A, residual, speed, c.degree, **c.size)
+
+    harmonics = stored.harmonics
+    if harmonics:
+        frame_velocity = A - _times(adjoint, c.A)
+        residual = bound(harmonics.residual)
+        harmonics = _harmonics(harmonics, adjoint, frame_velocity, residual)
+    even = stored.even
+    if even is not None:
+        even = bound(even)
     error = stored.A_error
+    if error is not None:
+        error = _times(np.abs(adjoint), error)
+    body = stored.body
+    if body is not None and frame != MINIMUM_PERTURBATION:
+        body = {**body, "frame": frame}
     return replace(
-        stored, connection=Connection(c.axes, A, residual, rms(A, np.nan_to_num(residual)), c.degree, **c.size), frame=frame,
-        harmonics=stored.harmonics and _harmonics(stored.harmonics, carried, A - _times(carried, c.A), bound),
-        even=bound(stored.even), A_error=None if error is None else _times(np.abs(carried), error),
-        body=stored.body if frame == MINIMUM_PERTURBATION or stored.body is None else {**stored.body, "frame": frame},
-    )  # fmt: skip
+        stored,
+        connection=connection,
+        frame=frame,
+        harmonics=harmonics,
+        even=even,
+        A_error=error,
+        body=body,
+    )
 
 
 def _times(matrices: np.ndarray, columns: np.ndarray) -> np.ndarray:
@@ -53,7 +75,8 @@ def _times(matrices: np.ndarray, columns: np.ndarray) -> np.ndarray:
 
 
 def _pose(stored: Stored, frame: str, chain: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return the pose h (N_1, ..., 3) of a frame in the table's on its grid, and dh / d alpha (N_1, ..., 3, d)."""
+    """Return the pose h (N_1, ..., 3) of a frame in the table's, on its grid, and
+    dh / d alpha (N_1, ..., 3, d)."""
     c = stored.connection
     if isinstance(c, Tube):
         raise Refusal(
@@ -72,7 +95,8 @@ def _pose(stored: Stored, frame: str, chain: Any) -> tuple[np.ndarray, np.ndarra
             instead=cure,
         )
     alpha = np.stack(np.meshgrid(*c.axes, indexing="ij"), -1)
-    h, columns = None, []
+    h = None
+    columns = []
     for unit in np.eye(len(c.axes)):
         h, column = chain.frame_pose(frame, alpha, unit)
         columns.append(column)
@@ -80,15 +104,15 @@ def _pose(stored: Stored, frame: str, chain: Any) -> tuple[np.ndarray, np.ndarra
 
 
 def _harmonics(
-    table: Harmonics, carried: np.ndarray, added: np.ndarray, bound
+    table: Harmonics, adjoint: np.ndarray, added: np.ndarray, residual: np.ndarray
 ) -> Harmonics:
-    """Return the harmonics of the other frame: their velocity carried over, and ``added`` (3, d, N_1, ...) times alphadot."""
+    """Return the harmonics of xi in the other frame: those of the first, times
+    ``adjoint`` (3, 3, N_1, ...), plus ``added`` (3, d, N_1, ...) times alphadot.
+    residual: of the new harmonics."""
     d = len(table.axes)
     unit = directions(d, max(2, 4 * table.coefficients.shape[1]))
-    linear = (
-        np.linalg.pinv(basis(unit, table.highest)) @ unit
-    )  # (terms, d): alphadot as a series of the same basis
-    coefficients = _times(carried, table.coefficients) + np.einsum(
-        "ik...,tk->it...", added, linear
-    )
-    return Harmonics(table.axes, coefficients, bound(table.residual), table.degree)
+    # alphadot as a series of the same basis, (terms, d).
+    linear = np.linalg.pinv(basis(unit, table.highest)) @ unit
+    coefficients = _times(adjoint, table.coefficients)
+    coefficients = coefficients + np.einsum("ik...,tk->it...", added, linear)
+    return Harmonics(table.axes, coefficients, residual, table.degree)

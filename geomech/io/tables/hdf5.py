@@ -1,4 +1,5 @@
-"""Arrays, texts, cells and structs in a MATLAB file of version 7.3, which is an HDF5 file, read by the package h5py.
+"""Arrays, texts, cells and structs in a MATLAB file of version 7.3, which is an HDF5
+file, read by the package h5py.
 
 Function handles and instances of classes are skipped, links out of the file refused.
 """
@@ -20,8 +21,8 @@ ANEW = "save it in MATLAB again, by save(FILE, ..., '-v7')"
 
 
 def arrays(raw: bytes, names: Collection[str]) -> dict[str, Any]:
-    """Return the variables that have one of some names, as `geomech.io.tables.matlab.arrays`; Refusal for a damaged file,
-    or without h5py."""
+    """Return the variables that have one of ``names``, with values as of
+    `geomech.io.tables.matlab.arrays`. Refusal for a damaged file, or without h5py."""
     try:
         import h5py
     except ImportError:
@@ -40,21 +41,26 @@ def arrays(raw: bytes, names: Collection[str]) -> dict[str, Any]:
             }
     except Refusal:
         raise
-    except Exception:  # what is damaged makes HDF5 raise whatever comes first
+    except Exception:  # HDF5 raises errors of all kinds for a damaged file
         raise Refusal(
             "is a damaged MATLAB 7.3 (HDF5) file, or cut short", instead=ANEW
         ) from None
 
 
 class Reader:
-    """Reader of the nodes of one file. bytes_left: what may still be read of it, inflated.
-    nodes_left: groups, arrays and references, each of which can be named many times."""
+    """Reader of the nodes of one file, within limits.
+
+    bytes_left: that may still be read, inflated. nodes_left: groups, arrays and
+    references that may still be read; a file can name each of them many times."""
 
     def __init__(self, file: Any):
-        self.file, self.bytes_left, self.nodes_left = file, LARGEST, MOST_NODES
+        self.file = file
+        self.bytes_left = LARGEST
+        self.nodes_left = MOST_NODES
 
     def member(self, group: Any, name: str, depth: int) -> Any:
-        """Return the value of a node in a group; Refusal, which says where, if it cannot be read."""
+        """Return the value of a node in a group; Refusal, with its place, if it cannot
+        be read."""
         import h5py
 
         place = f"{group.name.rstrip('/')}/{name}".lstrip("/").replace("/", ".")
@@ -68,7 +74,8 @@ class Reader:
             raise Refusal(f"is damaged at {place}", instead=ANEW) from None
 
     def value(self, node: Any, place: str, depth: int) -> Any:
-        """Return an array, a text, a cell or a struct; None for anything else."""
+        """Return an array, a text, a cell or a struct; None for anything else.
+        depth: of cells and structs that may still lie within."""
         import h5py
 
         self.nodes_left -= 1
@@ -96,7 +103,8 @@ class Reader:
         return values if kind and values.dtype.kind in "iuf" else None
 
     def _read(self, node: Any, place: str) -> np.ndarray:
-        """Return the values of a dataset, with the first axis first, which HDF5 has last."""
+        """Return the values of a dataset, with MATLAB's first axis, which HDF5 has
+        last, as the first."""
         self.bytes_left -= node.size * node.dtype.itemsize
         if self.bytes_left < 0:
             raise Refusal(f"is too large, or damaged, at {place}", instead=ANEW)
@@ -106,14 +114,12 @@ class Reader:
         values = np.empty(references.shape, object)
         for index in np.ndindex(references.shape):
             label = ", ".join(str(k + 1) for k in index)
+            inner_place = f"{place}{{{label}}}"
             try:
-                values[index] = self.value(
-                    self.file[references[index]], f"{place}{{{label}}}", depth - 1
-                )
+                node = self.file[references[index]]
+                values[index] = self.value(node, inner_place, depth - 1)
             except Refusal:
                 raise
             except Exception:
-                raise Refusal(
-                    f"is damaged at {place}{{{label}}}", instead=ANEW
-                ) from None
+                raise Refusal(f"is damaged at {inner_place}", instead=ANEW) from None
         return values

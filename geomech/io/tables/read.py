@@ -11,14 +11,16 @@ from geomech.io.foreign import refuse_program
 from geomech.io.tables.base import FORMATS, ORDERS, SIGNS, Stored
 from rft.core.refusal import Refusal
 
-LARGEST = 2_000_000_000  # bytes of a file: the finest field there is
+LARGEST = 2_000_000_000  # bytes of a file, enough for the finest field
 
 
 def load(path: str | Path, sign: str = "", order: str = "") -> Stored:
-    """Return the connection in a file of `geomech connection`, .nc or .mat; Refusal if it has none.
+    """Return the connection in a .nc or .mat file, as `geomech connection` writes them;
+    Refusal if it has none.
 
-    sign: "+" or "-" for xi = + or - A alphadot; if left out as the file says, or made out (`detected_sign`). order:
-    "ndgrid" or "meshgrid", the way arrays of a .mat file run; if left out as alpha1 and alpha2 in it run."""
+    sign: "+" or "-" for xi = + or - A alphadot; if left out the sign that the file
+    states, or that its values tell (`detected_sign`). order: "ndgrid" or "meshgrid", in
+    which arrays of a .mat file run; if left out the order of its alpha1 and alpha2."""
     if not isinstance(path, (str, Path)):
         raise Refusal("a table is a .nc or .mat file", value=path)
     path = Path(path)
@@ -37,10 +39,9 @@ def load(path: str | Path, sign: str = "", order: str = "") -> Stored:
         raise Refusal(
             f"cannot read the table {path}", because=reason_of(error)
         ) from None
+    parse = FORMATS[path.suffix.lower()]
     try:
-        return FORMATS[path.suffix.lower()](
-            raw, sign, order, hashlib.sha256(raw).hexdigest()
-        )
+        return parse(raw, sign, order, hashlib.sha256(raw).hexdigest())
     except Refusal as refusal:
         refusal.what = f"the table {path} {refusal.what}"
         raise

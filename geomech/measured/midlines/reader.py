@@ -28,9 +28,9 @@ import numpy as np
 
 from geomech.core.errors import choose
 from geomech.io.rows import (
+    DEEPLABCUT_WORDS,
     LARGEST_NUMBER,
     MISSING,
-    STACKED,
     UNITS,
     Rows,
     plain,
@@ -115,7 +115,7 @@ def is_midlines(header: Sequence[str]) -> bool:
     """Return whether the header of a file names points along a body, not a log of joint
     angles."""
     bare = {split_unit(name)[0] for name in header}
-    if {*header[:1]} & {*STACKED} or {*POINTS[:2]} & bare:
+    if {*header[:1]} & {*DEEPLABCUT_WORDS} or {*POINTS[:2]} & bare:
         return True
     if {"s", "curvature"} <= bare or len(_pairs(header)) > 1:
         return True
@@ -239,7 +239,7 @@ def _table(source: Rows, individual: str | None = None) -> Table:
     """Return the table of a file, whichever form it has."""
     header = source.header[1]
     _refuse_labelled(source)
-    if header and header[0] in STACKED:
+    if header and header[0] in DEEPLABCUT_WORDS:
         return _deeplabcut(source, individual)
     bare = {split_unit(name)[0]: k for k, name in enumerate(header)}
     if {"s", "curvature"} <= {*bare}:
@@ -586,7 +586,7 @@ def _deeplabcut(source: Rows, individual: str | None) -> Table:
     heads = {source.words[0].lower(): list(source.words[1:])}
     for _, text in source.rows[:3]:
         words = source.cells(text)
-        if words[0].lower() in STACKED:
+        if words[0].lower() in DEEPLABCUT_WORDS:
             heads[words[0].lower()] = words[1:]
     lengths = {len(words) for words in heads.values()}
     if not {"bodyparts", "coords"} <= {*heads} or len(lengths) > 1:
