@@ -9,18 +9,18 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from geomech import terminal
 from geomech.core.errors import Note
+from geomech.core.summary import wrapped
+from geomech.core.variables import Result
 from geomech.io.files import atomic_file, atomic_folder, note, refuse_inputs
-from geomech.questions.base import Run, ignore
+from geomech.questions.base import Question, Run, ignore
+from geomech.results import show
+from geomech.run.backend import prefer_for
+from geomech.run.cost import Cost, decide
 from rft.core.refusal import Refusal, in_line
-
-if TYPE_CHECKING:  # commands start without NumPy
-    from geomech.core.variables import Result
-    from geomech.questions.base import Question
-    from geomech.run.cost import Cost
 
 MORE = "--all prints all variables"
 
@@ -78,9 +78,6 @@ def notes_of(result: Result) -> list[str]:
 
 def printed(result: Result, as_json: bool, everything: bool) -> list[str]:
     """Return the lines that a command prints."""
-    from geomech.core.summary import wrapped
-    from geomech.results import show
-
     if as_json:
         return [json.dumps(result.to_dict())]
     lines = show.lines(result, everything)
@@ -93,8 +90,6 @@ def printed(result: Result, as_json: bool, everything: bool) -> list[str]:
 
 def contents(folders: Iterable[Path]) -> list[str]:
     """Return lines that name the files of folders."""
-    from geomech.core.summary import wrapped
-
     lines = []
     for folder in folders:
         names = sorted(p.name for p in folder.iterdir() if not p.name.startswith("."))
@@ -138,9 +133,6 @@ def allow(question: Question, cost: Cost, yes: bool) -> None:
     it takes too long to begin without --yes: here, or in its first second
     (`geomech.run.cost.decide`). From here on "auto" is the back end for that many
     balances."""
-    from geomech.run.backend import prefer_for
-    from geomech.run.cost import decide
-
     name = question.subject_name
 
     def judge(cost: Cost) -> None:

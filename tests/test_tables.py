@@ -23,7 +23,7 @@ from tabled import of_json, tabled
 import rft
 from geomech import api, plots, scenes
 from geomech.describe.explain import explained
-from geomech.describe.system import described
+from geomech.describe.system import system_lines
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier
 from geomech.geometry import connection
 from geomech.geometry.connection import Connection
@@ -615,7 +615,7 @@ def test_lengths_that_a_file_does_not_tell_are_assumed_in_a_note(
         file = tmp_path / f"a.{ending}"
         bare = Table(file)
         told = [line for line in bare.assumed if "body_length" in line]
-        assert told == [LENGTHS] and LENGTHS in described(bare)
+        assert told == [LENGTHS] and LENGTHS in system_lines(bare)
         assert (length_unit(bare), bare.length) == ("BL", 1.0)
         assert (bare.stored.connection.unit, bare.stored.connection.length) == (
             "BL",
@@ -629,7 +629,7 @@ def test_lengths_that_a_file_does_not_tell_are_assumed_in_a_note(
             said = Table(file, body_length=length)
             assert not [
                 line for line in said.assumed if "body_length" in line
-            ] and LENGTHS not in described(said)
+            ] and LENGTHS not in system_lines(said)
             np.testing.assert_allclose(
                 said.stored.connection.A[0] * length,
                 bare.stored.connection.A[0],

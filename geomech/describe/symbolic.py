@@ -12,6 +12,7 @@ import typer
 from geomech import terminal
 from geomech.options import SceneArgument
 from geomech.questions.loading import load_scene
+from rft.core.refusal import located
 
 if TYPE_CHECKING:
     from geomech.scenes import Scene
@@ -37,7 +38,6 @@ def formulas(scene: Scene, ccf: bool = True, latex: bool = False) -> Iterator[st
     Refusal for a system without closed form."""
     from geomech import symbolic as closed_form
     from geomech.systems.framed import formula
-    from rft.core.refusal import located
 
     formatted = entries
     if latex:

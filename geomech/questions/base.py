@@ -1,9 +1,10 @@
 """What a question is: a frozen dataclass whose annotated fields are its options.
 
 A module of a question imports what computes and what draws within its functions, and
-names types that it does not need to run in quotes, so that the help of its command loads
-neither NumPy nor a figure. It has no ``from __future__ import annotations``: options are
-read from the annotations.
+quotes types that it does not need to run: the help of its command loads NumPy, but no
+scenes, splines or figures. This module and those of the texts load no NumPy either, as
+the list of all commands imports them. A module of a question has no
+``from __future__ import annotations``: options are read from the annotations.
 """
 
 import contextlib

@@ -7,14 +7,18 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+import numpy as np
+
+from geomech.core.errors import choose
+from geomech.core.variables import Result, Variable
+from geomech.io.files import note
 from geomech.questions import loading, names, parsing, tools
 from geomech.questions.base import Option, Question, Run, Subject
 from geomech.questions.common import ColourLimit, OtherFrame, Pair, Panels, Slice
+from geomech.run.cost import Cost
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
-    from geomech.run.cost import Cost
     from geomech.scenes.model import Scene
     from geomech.studies.scene_tables import SceneTables
     from geomech.studies.shape_space import Plan
@@ -24,7 +28,7 @@ SHOWN = ("A",)
 
 def write_table(
     path: Path,
-    result: "Result",
+    result: Result,
     *,
     sign: Annotated[
         str | None, Option("sign of A in a .mat file: + (the default) or -", "+|-")
@@ -43,7 +47,6 @@ def write_table(
 ) -> None:
     """Write the connection in a layout of sysplotter's, or in a format of a plug-in
     (`geomech.io.tables.FORMATS`)."""
-    from geomech.io.files import note
     from geomech.io.tables import FORMATS, LAYOUTS, SIGNS
 
     ending = path.suffix.lower()
@@ -56,7 +59,7 @@ def write_table(
         note(f"{path} has {SIGNS['+']}; ``sign`` - gives the other")
 
 
-def with_contents(result: "Result", ending: str, layout: str | None = None) -> "Result":
+def with_contents(result: Result, ending: str, layout: str | None = None) -> Result:
     """Return the result with all that a format has; what it lacks is computed again."""
     from geomech.io.tables import FORMATS
     from geomech.results.scenes import scene_of
@@ -154,20 +157,18 @@ class Connection(Question):
             )
         self.plan.check()
 
-    def cost(self) -> "Cost":
+    def cost(self) -> Cost:
         return self.plan.cost()
 
     def check_draw(
         self, style: str = "quiver", component: Any = (), clim: Any = None
     ) -> None:
         from geomech import plots
-        from geomech.core.errors import choose
 
         parsing.one_limit(clim, component)
         choose("``style``", style, plots.CONNECTION_STYLES)
 
-    def compute(self, run: Run) -> "Result":
-        from geomech.core.variables import Result
+    def compute(self, run: Run) -> Result:
         from geomech.studies import fields, shape_space
 
         space = self._plan(run).compute(run.progress)
@@ -207,17 +208,17 @@ class Connection(Question):
         return {".mat": write_table}
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
+    def headline(result: Result) -> list[str]:
         facts = result.attributes
         about = f"local connection A, xi = A alphadot, in the frame {facts['frame']}"
         return [f"{facts['scene']}: {about}"]
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         return result.only(*SHOWN)
 
     @staticmethod
-    def remarks(result: "Result") -> list[str]:
+    def remarks(result: Result) -> list[str]:
         facts = result.attributes
         lines = [f"fit: {fit_words(result)}"]
         if "direction_share" in result:
@@ -231,7 +232,7 @@ class Connection(Question):
 
     @staticmethod
     def draw(
-        result: "Result",
+        result: Result,
         *,
         style: Annotated[
             str, Option("draw arrows (quiver, the default) or streamlines", "STYLE")
@@ -275,7 +276,6 @@ class Connection(Question):
 
 def check_settings(scene: Any, ending: str, options: dict[str, Any]) -> None:
     """Refuse a file that cannot have what is asked of it."""
-    from geomech.core.errors import choose
     from geomech.io.tables import FORMATS, LAYOUTS, ORDERS, SIGNS
     from geomech.studies import fields
 
@@ -306,8 +306,6 @@ def check_settings(scene: Any, ending: str, options: dict[str, Any]) -> None:
 
 def cost_variables(balances: int, seconds: float) -> list[Any]:
     """Return what the computation took."""
-    from geomech.core.variables import Variable
-
     return [
         Variable("balances", (), balances, "1", "force balances that were solved"),
         Variable("seconds", (), seconds, "s", "of computing"),
@@ -335,8 +333,6 @@ def facts_of(tables: "SceneTables") -> dict[str, Any]:
 
 def direction_words(shares: Any) -> list[str]:
     """Return by how much more directions of alphadot change A."""
-    import numpy as np
-
     rows = []
     for name, share in zip(["x", "y", "theta"], shares):
         if np.isfinite(share):
@@ -347,10 +343,8 @@ def direction_words(shares: Any) -> list[str]:
     return [f"directions of alphadot: more of them change A by about {changes} (rms)"]
 
 
-def fit_words(result: "Result") -> str:
+def fit_words(result: Result) -> str:
     """Return what the linear fit leaves of the velocity."""
-    import numpy as np
-
     if result.attributes.get("exact_fit"):
         return "exact, xi is linear in alphadot"
     if "fit_share" not in result or np.isnan(result["fit_share"].values).all():

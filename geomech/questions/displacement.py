@@ -6,15 +6,18 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, cast
 
+import numpy as np
+
+from geomech.core.variables import Result, Variable
 from geomech.questions import loading, names, parsing, tools
 from geomech.questions.base import Option, Question, Run, Subject
 from geomech.questions.common import CurvePanels
+from geomech.results.numbers import size
+from geomech.run.cost import Cost
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
     from geomech.gaits import Gait
-    from geomech.run.cost import Cost
     from geomech.scenes.model import Scene
 
 POSE = ("x", "y", "heading")
@@ -80,7 +83,7 @@ class Displacement(Question):
 
             refuse_costless(self.scene)
 
-    def cost(self) -> "Cost":
+    def cost(self) -> Cost:
         from geomech.studies import cost
 
         jobs = []
@@ -93,7 +96,7 @@ class Displacement(Question):
         # before each.
         return cost.price(jobs)
 
-    def compute(self, run: Run) -> "Result":
+    def compute(self, run: Run) -> Result:
         if self.tolerance is None:
             tables = run.tables_of(self.scene)
             found = tables.displacements(
@@ -107,7 +110,7 @@ class Displacement(Question):
             found = with_effort(found, self.scene, self.gait)
         return found
 
-    def _cheapest(self, run: Run) -> "Result":
+    def _cheapest(self, run: Run) -> Result:
         from geomech.studies import cost
         from geomech.studies.choose import cheapest
 
@@ -125,7 +128,7 @@ class Displacement(Question):
         points(data, self.scene, component)
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
+    def headline(result: Result) -> list[str]:
         facts = result.attributes
         first = f"{facts['scene']}: displacement per cycle, {tier_words(result)}"
         lines = [first, f"amplitude: {amplitude_words(result)}; {FRAME}"]
@@ -134,10 +137,8 @@ class Displacement(Question):
         return lines
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         """Return the pose by the most exact tier, and x by the others."""
-        from geomech.core.variables import Variable
-
         index = exact_tier(result)
         tiers = result["tier"].values.tolist()
         shown = result.at(tier=tiers[index]).only(*POSE, "speed", *EFFORT)
@@ -152,7 +153,7 @@ class Displacement(Question):
         return without_undefined(shown).with_variables(coordinate, x)
 
     @staticmethod
-    def remarks(result: "Result") -> list[str]:
+    def remarks(result: Result) -> list[str]:
         facts = result.attributes
         lines = []
         if result.sizes["amplitude"] > COMPARED and len(result["tier"].values) > 1:
@@ -169,7 +170,7 @@ class Displacement(Question):
 
     @staticmethod
     def draw(
-        result: "Result",
+        result: Result,
         *,
         component: CurvePanels = (),
         data: Annotated[
@@ -207,11 +208,9 @@ def points(data: Any, scene: Any, component: Sequence[str]) -> Any:
     return measurements(Path(data), scene, tuple(component))
 
 
-def without_undefined(result: "Result") -> "Result":
+def without_undefined(result: Result) -> Result:
     """Return the result without variables that are nothing but nan, such as the work of a
     system that has none."""
-    import numpy as np
-
     undefined = []
     for v in result.variables:
         if v.values.dtype.kind == "f" and v.values.size and np.isnan(v.values).all():
@@ -219,16 +218,14 @@ def without_undefined(result: "Result") -> "Result":
     return result.without(*undefined)
 
 
-def exact_tier(result: "Result") -> int:
+def exact_tier(result: Result) -> int:
     """Return the number of the tier whose largest error of position is least, the last of
     several."""
-    import numpy as np
-
     errors = np.nan_to_num(result["x"].error, nan=np.inf).max(1, initial=0.0)
     return len(errors) - 1 - int(errors[::-1].argmin())
 
 
-def tier_words(result: "Result") -> str:
+def tier_words(result: Result) -> str:
     """Return the name of the tier that is shown, and why it is this one."""
     tiers, facts = result["tier"].values.tolist(), result.attributes
     name = tiers[exact_tier(result)]
@@ -239,15 +236,13 @@ def tier_words(result: "Result") -> str:
     return f"{name} tier"
 
 
-def amplitude_words(result: "Result") -> str:
+def amplitude_words(result: Result) -> str:
     """Return what an amplitude is, without the marks of formulas."""
     return re.sub(r"[$\\]", "", result["amplitude"].label)
 
 
-def errors_of_others(result: "Result") -> str:
+def errors_of_others(result: Result) -> str:
     """Return the largest errors of the tiers that are not shown."""
-    from geomech.results.numbers import size
-
     shown = exact_tier(result)
     x, words = result["x"], []
     for k, tier in enumerate(result["tier"].values.tolist()):
@@ -256,11 +251,8 @@ def errors_of_others(result: "Result") -> str:
     return f"other tiers, largest error ({x.unit}): {', '.join(words)}"
 
 
-def shift_words(result: "Result") -> Iterable[str]:
+def shift_words(result: Result) -> Iterable[str]:
     """Yield how far uncertain media shift the mean of a quantity, where that matters."""
-    import numpy as np
-
-    from geomech.results.numbers import size
     from geomech.studies.uncertainty import SEEN, SHIFTED
 
     length = result.attributes["body_length"]

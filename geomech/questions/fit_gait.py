@@ -8,12 +8,14 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from geomech.core.variables import Result
+from geomech.io.files import write_text
 from geomech.questions import loading, logs, parsing, tools, trials
 from geomech.questions.base import Option, Question, Run, Subject
+from rft.core.checks import in_range
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
     from geomech.measured.log import Log
     from geomech.measured.midlines.trial import Trial
 
@@ -21,11 +23,10 @@ HELP = "table of joint angles, x, y, heading, or points of midlines"
 SCENE = ".toml"
 
 
-def write_scene(path: Path, result: "Result", *, field: Path | None = None) -> None:
+def write_scene(path: Path, result: Result, *, field: Path | None = None) -> None:
     """Write a scene of the mean gait of a log, which takes the connection from a file of
     the result. field: that file; by default the one that the command writes, or of the
     scene's name with the ending .nc."""
-    from geomech.io.files import write_text
     from geomech.results.measured import scene_text
 
     asked = getattr(result.question, "connection_file", None)
@@ -152,8 +153,6 @@ class FitGait(Question):
         )
 
     def check(self) -> None:
-        from rft.core.checks import in_range
-
         if self.body_length is not None:
             in_range("``body_length``", self.body_length, 1e-9, 1e9)
         _ = self.form  # refuses options of the other
@@ -168,12 +167,12 @@ class FitGait(Question):
             return medium_of(self.medium)
         return self.medium
 
-    def compute(self, run: Run) -> "Result":
+    def compute(self, run: Run) -> Result:
         if self.form == "log":
             return self._of_log()
         return self._of_midlines()
 
-    def _of_log(self) -> "Result":
+    def _of_log(self) -> Result:
         from geomech.measured.fit import fit_log
         from geomech.measured.results import of_fit
 
@@ -182,7 +181,7 @@ class FitGait(Question):
         given = {name: getattr(self, name) for name in names}
         return of_fit(fit_log(log, **given), self.mapped)
 
-    def _of_midlines(self) -> "Result":
+    def _of_midlines(self) -> Result:
         from geomech.measured.midlines.fit import fit_midlines
         from geomech.measured.midlines.predicted import compare
         from geomech.measured.midlines.results import of_trial
@@ -198,11 +197,11 @@ class FitGait(Question):
             return of_trial(fit)
         return of_trial(fit, compare(fit, self.known_medium, tuple(self.effects)))
 
-    def answer(self, run: Run) -> "Result":
+    def answer(self, run: Run) -> Result:
         # Measurements have a name, and are no scene.
         return replace(self.compute(run), question=self)
 
-    def ask(self, tables: Any = None) -> "Result":
+    def ask(self, tables: Any = None) -> Result:
         result = super().ask(tables)
         tools.warn_of_notes(result)
         return result
@@ -212,19 +211,19 @@ class FitGait(Question):
         return {SCENE: write_scene}
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
+    def headline(result: Result) -> list[str]:
         return presenting(result).headline(result)
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         return presenting(result).summary(result)
 
     @staticmethod
-    def remarks(result: "Result") -> list[str]:
+    def remarks(result: Result) -> list[str]:
         return presenting(result).remarks(result)
 
     @staticmethod
-    def draw(result: "Result") -> Any:
+    def draw(result: Result) -> Any:
         """Draw the mean gait, the connection along it and its cycles; or the way of the
         body, slip and amplitude along it, and the prediction. Return the Figure."""
         from geomech import plots
@@ -234,7 +233,7 @@ class FitGait(Question):
         return plots.midlines_figure(result)
 
 
-def presenting(result: "Result") -> ModuleType:
+def presenting(result: Result) -> ModuleType:
     """Return the module with the words for what was measured."""
     if result.attributes["form"] == "log":
         return logs

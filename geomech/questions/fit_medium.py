@@ -4,13 +4,12 @@ the strength of one from a plate that is pushed straight down."""
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
+from geomech.core.variables import Result
+from geomech.io.files import write_text
 from geomech.questions import loading, names, parsing, tools
 from geomech.questions.base import Option, Question, Run, Subject
-
-if TYPE_CHECKING:
-    from geomech.core.variables import Result
 
 HELP = "CSV file, or short-rod-drag or flank-drag, samples that ship"
 SIZES = ("radius", "length", "depth", "density", "area")
@@ -31,10 +30,8 @@ DRAGS = {
 }
 
 
-def write_medium(path: Path, result: "Result") -> None:
+def write_medium(path: Path, result: Result) -> None:
     """Write the medium as a file for scenes."""
-    from geomech.io.files import write_text
-
     write_text(path, result.attributes["medium_toml"])
 
 
@@ -101,14 +98,14 @@ class FitMedium(Question):
     def check(self) -> None:
         _ = self.chosen_law  # refuses an unknown one
 
-    def compute(self, run: Run) -> "Result":
+    def compute(self, run: Run) -> Result:
         from geomech.studies import calibration
 
         given = {name: getattr(self, name) for name in SIZES}
         sizes = {name: size for name, size in given.items() if size is not None}
         return calibration.answer(self.drag, self.chosen_law, sizes, self.end_caps)
 
-    def ask(self, tables: Any = None) -> "Result":
+    def ask(self, tables: Any = None) -> Result:
         result = super().ask(tables)
         tools.warn_of_notes(result)
         return result
@@ -118,7 +115,7 @@ class FitMedium(Question):
         return {".toml": write_medium}
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
+    def headline(result: Result) -> list[str]:
         facts, law = result.attributes, result.attributes["law"]
         name = facts["file"]
         if law == MAP:
@@ -131,7 +128,7 @@ class FitMedium(Question):
         return [f"{law} law fitted to {name}: {size}"]
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         law = result.attributes["law"]
         if law == MAP:
             shown = result.only("value", "share_from_data", "generic", "zeta", "rms")
@@ -147,7 +144,7 @@ class FitMedium(Question):
         return with_rows(result.only("value", *known), result, ("psi",), ROWS)
 
     @staticmethod
-    def remarks(result: "Result") -> list[str]:
+    def remarks(result: Result) -> list[str]:
         law = result.attributes["law"]
         lines = ["errors are half widths of intervals with 95 %"]
         if law == MAP:
@@ -166,7 +163,7 @@ class FitMedium(Question):
         ]
 
     @staticmethod
-    def draw(result: "Result") -> Any:
+    def draw(result: Result) -> Any:
         """Draw the measurements with the fit, and the residuals; return the Figure."""
         from geomech import plots
 
@@ -179,11 +176,11 @@ class FitMedium(Question):
 
 
 def with_rows(
-    shown: "Result",
-    result: "Result",
+    shown: Result,
+    result: Result,
     places: tuple[str, ...],
     columns: dict[str, tuple[str, str]],
-) -> "Result":
+) -> Result:
     """Return what is shown with a few measurements and the fit to them, side by side;
     many are left out. places: variables that stand before them."""
     if result[places[0]].values.size > FEW:
@@ -195,7 +192,7 @@ def with_rows(
     return shown.with_variables(*rows)
 
 
-def undetermined_words(result: "Result") -> list[str]:
+def undetermined_words(result: Result) -> list[str]:
     """Return which coefficients the data do not settle; [] if they settle all."""
     missing = result["parameter"].values[result["undetermined"].values > 0]
     if not missing.size:
@@ -203,7 +200,7 @@ def undetermined_words(result: "Result") -> list[str]:
     return [f"not determined by these drags: {', '.join(missing)}"]
 
 
-def rod_words(result: "Result") -> list[str]:
+def rod_words(result: Result) -> list[str]:
     """Return what is known of the rod's ends and sizes, and what is lacking."""
     ends = float(result["end_caps"])
     caps = "left out"

@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from geomech.core.variables import Result
 from geomech.questions import loading, names, parsing
 from geomech.questions.base import Option, Question, Run, Subject
 from geomech.questions.common import ColourLimit
+from geomech.results.show import scalar
+from geomech.run.cost import Cost
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
-    from geomech.run.cost import Cost
     from geomech.scenes.model import Scene
     from geomech.studies.newtons import Sizes
 
@@ -56,18 +57,18 @@ class Forces(Question):
 
         forces.check(self.scene, self.sizes)
 
-    def cost(self) -> "Cost":
+    def cost(self) -> Cost:
         from geomech.studies import forces
 
         return forces.cost(self.scene)
 
-    def compute(self, run: Run) -> "Result":
+    def compute(self, run: Run) -> Result:
         from geomech.studies import forces
 
         return forces.answer(self.scene, self.sizes)
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
+    def headline(result: Result) -> list[str]:
         name = result.attributes["scene"]
         if not result.attributes["travels"]:
             where = "forwards is where the frame points to at phase 0"
@@ -80,11 +81,11 @@ class Forces(Question):
         ]
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         return result.only("thrust", "drag")
 
     @staticmethod
-    def remarks(result: "Result") -> list[str]:
+    def remarks(result: Result) -> list[str]:
         return [
             "thrust and drag: means over the cycle, in the direction of travel",
             power_words(result),
@@ -95,7 +96,7 @@ class Forces(Question):
 
     @staticmethod
     def draw(
-        result: "Result",
+        result: Result,
         *,
         component: Annotated[
             Sequence[str], Option(PANELS, "NAMES", parsing.force_panels)
@@ -109,9 +110,7 @@ class Forces(Question):
         return plots.forces_figure(result, component, clim=clim)
 
 
-def power_words(result: "Result") -> str:
-    from geomech.results.show import scalar
-
+def power_words(result: Result) -> str:
     power, largest = result["mean_power"], float(result["largest_power"])
     joints = float(result["mean_joint_power"])
     at_joints = f"at the joints {joints:.4g} {power.unit}"
@@ -120,7 +119,7 @@ def power_words(result: "Result") -> str:
     return f"power {scalar(power)} into the medium, largest {largest:.4g}; {at_joints}"
 
 
-def moment_words(result: "Result") -> str:
+def moment_words(result: Result) -> str:
     moment = result["largest_moment"]
     place = float(result["largest_moment_s"])
     phase = float(result["largest_moment_phase"])
@@ -130,7 +129,7 @@ def moment_words(result: "Result") -> str:
     )
 
 
-def activation_words(result: "Result") -> str:
+def activation_words(result: Result) -> str:
     lags, places = result["lag_of_activation"].values, result["place"].values
     ahead = ", ".join(f"{lag:.3g}" for lag in lags)
     at = ", ".join(f"{place:.3g}" for place in places)

@@ -4,13 +4,13 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from geomech.core.variables import Result
 from geomech.questions import loading, names
 from geomech.questions.base import Option, Question, Run, Subject
 from geomech.questions.common import Store
+from geomech.run.cost import Cost
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
-    from geomech.run.cost import Cost
     from geomech.scenes.model import Scene
     from geomech.studies.grain_swim import GrainSwim
 
@@ -69,14 +69,14 @@ class Grains(Question):
     def check(self) -> None:
         self.study.check()
 
-    def cost(self) -> "Cost":
+    def cost(self) -> Cost:
         return self.study.cost()
 
-    def compute(self, run: Run) -> "Result":
+    def compute(self, run: Run) -> Result:
         return self.study.answer(run.progress)
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
+    def headline(result: Result) -> list[str]:
         facts = result.attributes
         length = 1e3 * float(result["body_length"])
         width = 2e3 * float(result["body_radius"])
@@ -86,11 +86,11 @@ class Grains(Question):
         ]
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         return result.only(*SHOWN)
 
     @staticmethod
-    def remarks(result: "Result") -> list[str]:
+    def remarks(result: Result) -> list[str]:
         facts = result.attributes
         overlap = float(result["largest_overlap"])
         return [
@@ -100,7 +100,7 @@ class Grains(Question):
         ]
 
     @staticmethod
-    def draw(result: "Result") -> Any:
+    def draw(result: Result) -> Any:
         """Draw the body at the start of every cycle with the track of its frame, and the
         distance per cycle by every method; return the Figure."""
         from geomech import plots

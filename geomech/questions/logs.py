@@ -1,18 +1,15 @@
 """The words for results of logs of joint angles."""
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from geomech.core.variables import Result, Variable
 from geomech.questions import tools
-
-if TYPE_CHECKING:
-    from geomech.core.variables import Result
 
 POSE = ("x", "y", "heading")
 QUALITY = ("difference", "scatter")  # by component
 
 
-def headline(result: "Result") -> list[str]:
+def headline(result: Result) -> list[str]:
     facts = result.attributes
     irregular, frequency = float(result["phase_residual"]), float(result["frequency"])
     cycles = f"{facts['cycles']} whole cycles of {facts['columns']}"
@@ -23,10 +20,8 @@ def headline(result: "Result") -> list[str]:
     ]
 
 
-def summary(result: "Result") -> "Result":
+def summary(result: Result) -> Result:
     """Return the displacements as logged and as predicted, side by side."""
-    from geomech.core.variables import Variable
-
     predicted = [f"{name}_predicted" for name in POSE]
     shown = [
         Variable("pose", ("pose",), POSE),
@@ -38,7 +33,7 @@ def summary(result: "Result") -> "Result":
     return result.only().with_variables(*shown)
 
 
-def remarks(result: "Result") -> list[str]:
+def remarks(result: Result) -> list[str]:
     count, reach = int(result["harmonics"].values), result["reach_along"].values
     word = "harmonic" if count == 1 else "harmonics"
     parts = []

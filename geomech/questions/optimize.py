@@ -6,15 +6,17 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from geomech.core.variables import Result
+from geomech.io.files import write_text
 from geomech.questions import loading, names, parsing
 from geomech.questions.base import Option, Question, Run, Subject
 from geomech.questions.common import ColourLimit
+from geomech.results.show import scalar
+from geomech.run.cost import Cost
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
     from geomech.optimisation.request import Request
-    from geomech.run.cost import Cost
     from geomech.scenes.model import Scene
 
 SHOWN = ("x", "y", "heading", "path_length", "work", "frequency")
@@ -23,10 +25,8 @@ COMMENT = 86  # characters of a line above the scene
 SAME = 1e-12  # relative: a value that is no better
 
 
-def write_scene(path: Path, result: "Result") -> None:
+def write_scene(path: Path, result: Result) -> None:
     """Write the scene with the best gait, behind a comment with its value."""
-    from geomech.io.files import write_text
-
     if "best_scene_toml" not in result.attributes:
         raise Refusal(
             "the scene has parts that no file can name",
@@ -111,11 +111,10 @@ class Optimize(Question):
         if self.stretched:
             check_stretch(self.scene)
 
-    def cost(self) -> "Cost":
+    def cost(self) -> Cost:
         return self.request.cost()
 
-    def compute(self, run: Run) -> "Result":
-        from geomech.core.variables import Result
+    def compute(self, run: Run) -> Result:
         from geomech.optimisation import search, variables
         from geomech.studies.effort import units
         from geomech.studies.fields import of_stretch
@@ -137,9 +136,7 @@ class Optimize(Question):
         return {".toml": write_scene}
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
-        from geomech.results.show import scalar
-
+    def headline(result: Result) -> list[str]:
         facts, value = result.attributes, result["value"]
         sought = facts["objective"]
         if "direction" in facts:
@@ -153,14 +150,14 @@ class Optimize(Question):
         return lines
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         shown: tuple[str, ...] = SHOWN
         if result.attributes["starts"] > 1:
             shown = (*SHOWN, *ANSWERS)
         return result.only(*shown)
 
     @staticmethod
-    def remarks(result: "Result") -> list[str]:
+    def remarks(result: Result) -> list[str]:
         facts = result.attributes
         lines = []
         if "largest_rate" in facts:
@@ -181,7 +178,7 @@ class Optimize(Question):
 
     @staticmethod
     def draw(
-        result: "Result",
+        result: Result,
         *,
         stretch: Annotated[
             bool, Option("draw it also where equal lengths take equal effort")

@@ -7,6 +7,7 @@ subject, and the option as it is typed.
 from pathlib import Path
 from typing import Any
 
+from geomech.core.errors import choose
 from geomech.questions import texts
 from rft.core.refusal import Refusal
 
@@ -20,7 +21,6 @@ def amplitudes(text: str, scene: Any, flag: str) -> tuple[float, ...]:
 
 def tiers(text: str, scene: Any, flag: str) -> tuple[str, ...]:
     """Return the names in path,direct."""
-    from geomech.core.errors import choose
     from geomech.tiers import TIERS
 
     return tuple(choose("``tiers``", name.strip(), TIERS) for name in text.split(","))

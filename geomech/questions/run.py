@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from geomech.core.variables import Result
+from geomech.io.files import read, refuse_inputs, write_text
 from geomech.questions import base, loading, names, parsing
 from geomech.questions.base import Option, Question, Subject
 from geomech.questions.common import ColourLimit, Panels
@@ -15,11 +17,10 @@ from geomech.questions.displacement import (
     points,
     tier_words,
 )
+from geomech.run.cost import Cost
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
-    from geomech.run.cost import Cost
     from geomech.scenes.model import Scene
 
 SCENE, TABLES, FIELD = "scene.toml", "displacement.json", "connection.nc"
@@ -63,7 +64,7 @@ class Run(Question):
             refuse_folder(self.scene, path)
         return self
 
-    def cost(self) -> "Cost":
+    def cost(self) -> Cost:
         from geomech.studies import report
 
         return report.cost(self.scene)
@@ -74,13 +75,13 @@ class Run(Question):
         parsing.one_limit(clim, component)
         points(data, self.scene, component)
 
-    def compute(self, run: base.Run) -> "Result":
+    def compute(self, run: base.Run) -> Result:
         from geomech.studies import report
 
         return report.answer(run.tables_of(self.scene), run.shown_progress)
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
+    def headline(result: Result) -> list[str]:
         """Return what the tables are: of the scene's own gait first."""
         from geomech.studies.report import tables_of
 
@@ -94,7 +95,7 @@ class Run(Question):
         return lines
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         """Return what is shown first of the displacements of each gait."""
         from geomech.studies.report import is_own, prefixed, tables_of
 
@@ -106,7 +107,7 @@ class Run(Question):
         return replace(result, variables=tuple(variables))
 
     @staticmethod
-    def remarks(result: "Result") -> list[str]:
+    def remarks(result: Result) -> list[str]:
         from geomech.studies.report import tables_of
 
         (_, own), *others = tables_of(result).items()
@@ -117,7 +118,7 @@ class Run(Question):
         return lines
 
     @staticmethod
-    def draw(result: "Result", *, component: Panels = (), data: Data = None) -> Any:
+    def draw(result: Result, *, component: Panels = (), data: Data = None) -> Any:
         """Draw displacements against amplitude, a row a gait; return the Figure."""
         from geomech import plots
         from geomech.results.scenes import scene_of
@@ -131,7 +132,7 @@ class Run(Question):
 
     @staticmethod
     def fill(
-        result: "Result",
+        result: Result,
         folder: Path,
         *,
         component: Panels = (),
@@ -140,7 +141,6 @@ class Run(Question):
     ) -> None:
         """Write the scene, the displacements and the connection with their pictures into
         a folder."""
-        from geomech.io.files import write_text
         from geomech.results.files import save
         from geomech.results.scenes import scene_of
         from geomech.scenes.write import toml
@@ -156,7 +156,7 @@ class Run(Question):
         write_text(folder / SCENE, toml(scene_of(result)))
 
 
-def save_maps(result: "Result", folder: Path, component: Any, clim: Any) -> None:
+def save_maps(result: Result, folder: Path, component: Any, clim: Any) -> None:
     """Draw the connection and the CCF, of three joints for every pair, and the frame that
     was chosen, if it is one of those."""
     from geomech import plots
@@ -194,7 +194,6 @@ def save_figure(figure: Any, stem: Path) -> None:
 def refuse_folder(scene: Any, folder: Path) -> None:
     """Refuse a folder in which an input would be replaced, or a scene that no `run` has
     written."""
-    from geomech.io.files import refuse_inputs
     from geomech.scenes import inputs
     from geomech.scenes.write import toml
 
@@ -212,8 +211,6 @@ def refuse_folder(scene: Any, folder: Path) -> None:
 
 def holds(path: Path, text: str) -> bool:
     """Return whether a file has this text and no more."""
-    from geomech.io.files import read
-
     try:
         return read(path, 4 * len(text) + 4) == text.encode()
     except (OSError, ValueError):

@@ -2,13 +2,12 @@
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
+from geomech.core.variables import Result
 from geomech.questions import names
 from geomech.questions.base import Option, Question, Run, Subject
-
-if TYPE_CHECKING:
-    from geomech.core.variables import Result
+from geomech.results.numbers import number
 
 HELP = "name (see 'geomech scenes'), TOML or CSV of plate drags"
 
@@ -51,15 +50,13 @@ class Stress(Question):
 
         stress.check(self.beta, self.gamma, self.drawn)
 
-    def compute(self, run: Run) -> "Result":
+    def compute(self, run: Run) -> Result:
         from geomech.studies import stress
 
         return stress.answer(self.medium, self.beta, self.gamma, self.drawn)
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
-        from geomech.results.numbers import number
-
+    def headline(result: Result) -> list[str]:
         parts = []
         for name in ("alpha_x", "alpha_z"):
             if name in result:
@@ -72,11 +69,11 @@ class Stress(Question):
         return ["; ".join(parts), about]
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         return result.only()
 
     @staticmethod
-    def draw(result: "Result") -> Any:
+    def draw(result: Result) -> Any:
         """Draw the stress map, and the plate that was asked for on it; return the
         Figure."""
         from geomech import plots

@@ -6,13 +6,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from geomech.core.variables import Result
 from geomech.questions import loading, names, parsing
 from geomech.questions.base import Option, Question, Run, Subject
+from geomech.run.cost import Cost
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
-    from geomech.run.cost import Cost
     from geomech.scenes.model import Scene
     from geomech.studies.sweep import Plan
 
@@ -57,10 +57,10 @@ class Sweep(Question):
                 instead="sweep one or two, or leave ``plot`` out",
             )
 
-    def cost(self) -> "Cost":
+    def cost(self) -> Cost:
         return self.plan.cost
 
-    def compute(self, run: Run) -> "Result":
+    def compute(self, run: Run) -> Result:
         from geomech.studies.sweep import stored_in
 
         seconds = None
@@ -70,7 +70,7 @@ class Sweep(Question):
             return self.plan.result(run.progress, seconds)
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
+    def headline(result: Result) -> list[str]:
         axes = [v for v in result.variables if v.is_coordinate]
         points = 1
         for axis in axes:
@@ -79,11 +79,11 @@ class Sweep(Question):
         return [f"{result.attributes['scene']}: {points} points, {over}"]
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         return result.only(*SHOWN)
 
     @staticmethod
-    def draw(result: "Result") -> Any:
+    def draw(result: Result) -> Any:
         """Draw curves over one parameter, or maps over two; return the Figure."""
         from geomech import plots
         from geomech.results.scenes import scene_of

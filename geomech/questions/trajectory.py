@@ -5,13 +5,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from geomech.core.variables import Result
 from geomech.questions import loading, names
 from geomech.questions.base import Option, Question, Run, Subject
 from geomech.questions.tools import FILMS, check_films, is_film
+from geomech.run.cost import Cost
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
-    from geomech.run.cost import Cost
     from geomech.scenes.model import Scene
 
 POSE = ("x", "y", "heading")
@@ -20,7 +20,7 @@ OF_FILM = 3  # cycles, where nobody says how many
 WITHOUT_MAP = (".csv", ".txt")  # files that nobody draws from
 
 
-def write_film(path: Path, result: "Result") -> None:
+def write_film(path: Path, result: Result) -> None:
     """Write a film of the motion."""
     from geomech import films
 
@@ -73,7 +73,7 @@ class Trajectory(Question):
 
         motion.checked(self.count)
 
-    def cost(self) -> "Cost":
+    def cost(self) -> Cost:
         from geomech.studies import motion
 
         cost = motion.cost(self.scene, self.count, self.mapped)
@@ -85,7 +85,7 @@ class Trajectory(Question):
         frequency = motion.frequency_of(self.scene)
         return motion.summed([cost, films.cost(phases, self.count, frequency)])
 
-    def compute(self, run: Run) -> "Result":
+    def compute(self, run: Run) -> Result:
         from geomech.studies import motion
 
         tables = run.tables_of(self.scene)
@@ -96,7 +96,7 @@ class Trajectory(Question):
         return dict.fromkeys(FILMS, write_film)
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
+    def headline(result: Result) -> list[str]:
         facts = result.attributes
         count = facts["cycles"]
         cycles = "1 cycle"
@@ -108,11 +108,11 @@ class Trajectory(Question):
         ]
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         return result.only(*FINAL, "time", *POSE)
 
     @staticmethod
-    def draw(result: "Result", *, pictures: int = 6) -> Any:
+    def draw(result: Result, *, pictures: int = 6) -> Any:
         """Draw the body at some phases and its shapes beside it; return the Figure.
 
         pictures: how many."""

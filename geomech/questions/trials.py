@@ -1,11 +1,10 @@
 """The words for results of midlines."""
 
-from typing import TYPE_CHECKING
+import math
 
+from geomech.core.variables import Result
 from geomech.questions import tools
-
-if TYPE_CHECKING:
-    from geomech.core.variables import Result
+from geomech.results.show import scalar
 
 SHOWN = (
     "frequency", "body_length", "speed", "stride", "heading", "turn", "slip",
@@ -13,7 +12,7 @@ SHOWN = (
 )  # fmt: skip
 
 
-def headline(result: "Result") -> list[str]:
+def headline(result: Result) -> list[str]:
     facts, noise = result.attributes, float(result["noise"])
     first = (
         f"{facts['file']}: {facts['cycles']} full cycles of {facts['points']} points"
@@ -30,7 +29,7 @@ def headline(result: "Result") -> list[str]:
     ]
 
 
-def summary(result: "Result") -> "Result":
+def summary(result: Result) -> Result:
     """Return the quantities and, of a prediction, what is measured and what is predicted
     side by side."""
     shown = result.only(*SHOWN)
@@ -45,7 +44,7 @@ def summary(result: "Result") -> "Result":
     )
 
 
-def remarks(result: "Result") -> list[str]:
+def remarks(result: Result) -> list[str]:
     lines = []
     if "compared" in result:
         names = result["compared"].values
@@ -59,12 +58,8 @@ def remarks(result: "Result") -> list[str]:
     return lines
 
 
-def closing_words(result: "Result", name: str) -> str:
+def closing_words(result: Result, name: str) -> str:
     """Return which value of a parameter of the medium gives the measured distance."""
-    import math
-
-    from geomech.results.show import scalar
-
     one = result.at(parameter=name)
     present, closing = one["parameter_present"], one["parameter_closing"]
     words = f"{name} = {scalar(tools.in_degrees(present))}"

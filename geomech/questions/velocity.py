@@ -3,11 +3,12 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
+from geomech.core.variables import Result
 from geomech.questions import loading, names, parsing, tools
 from geomech.questions.base import Option, Question, Run, Subject
+from rft.core.refusal import located
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
     from geomech.scenes.model import Scene
 
 
@@ -35,15 +36,13 @@ class Velocity(Question):
             alpha=tools.numbers(self.alpha), alphadot=tools.numbers(self.alphadot)
         )
 
-    def compute(self, run: Run) -> "Result":
-        from geomech.core.variables import Result
+    def compute(self, run: Run) -> Result:
         from geomech.studies.single import velocity
-        from rft.core.refusal import located
 
         with located(self.scene.name):
             found = velocity(self.scene.system, self.alpha, self.alphadot)
         return Result("velocity", (tools.component(), *found))
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
+    def headline(result: Result) -> list[str]:
         return [f"{result.attributes['scene']}: body velocity xi per unit of time"]

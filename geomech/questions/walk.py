@@ -6,13 +6,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+import numpy as np
+
+from geomech.core.variables import Result
 from geomech.questions import loading, names
 from geomech.questions.base import Option, Question, Run, Subject
 from geomech.questions.tools import FILMS, check_films
+from geomech.results.show import scalar
+from geomech.run.cost import LONGEST, Cost
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
-    from geomech.run.cost import Cost
     from geomech.scenes.walker import WalkerScene
 
 WALKING = "walking"  # status of a robot that neither sank nor fell
@@ -21,7 +24,7 @@ ANGLES = {"pitch": "nose down", "roll": "left side up", "yaw": "turning left"}
 
 def write_film(
     path: Path,
-    result: "Result",
+    result: Result,
     *,
     follow: Annotated[bool, Option("the camera of the film goes with the robot")] = (
         False
@@ -55,14 +58,12 @@ class Walk(Question):
         check_films(paths)
         return self
 
-    def cost(self) -> "Cost":
+    def cost(self) -> Cost:
         from geomech.studies import walking
 
         return walking.price(self.scene, by=self.engine)
 
-    def compute(self, run: Run) -> "Result":
-        from geomech.core.variables import Result
-        from geomech.run.cost import LONGEST
+    def compute(self, run: Run) -> Result:
         from geomech.studies import walking
 
         longest = LONGEST if run.limited else math.inf
@@ -74,9 +75,7 @@ class Walk(Question):
         return dict.fromkeys(FILMS, write_film)
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
-        from geomech.results.show import scalar
-
+    def headline(result: Result) -> list[str]:
         name, status = result.attributes["scene"], str(result["status"].values)
         speed = scalar(result["speed"])
         regular = "no limit cycle found: mean of what there is"
@@ -86,7 +85,7 @@ class Walk(Question):
         return [f"{name}: {status} at {speed} at {frequency:g} Hz ({regular})"]
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         shown = ["total_work", "total_loss", "cost_of_transport"]
         if str(result["status"].values) != WALKING:
             shown.remove("cost_of_transport")
@@ -95,7 +94,7 @@ class Walk(Question):
         return result.only(*shown)
 
     @staticmethod
-    def remarks(result: "Result") -> list[str]:
+    def remarks(result: Result) -> list[str]:
         steps = float(result["speed_error_of_steps"])
         elements = float(result["speed_error_of_elements"])
         share = 100 * float(result["unaccounted"])
@@ -118,7 +117,7 @@ class Walk(Question):
 
     @staticmethod
     def draw(
-        result: "Result",
+        result: Result,
         *,
         strip: Annotated[bool, Option("draw the last cycle in pictures")] = False,
     ) -> Any:
@@ -131,7 +130,7 @@ class Walk(Question):
         return plots.walk_figure(result)
 
 
-def settling_words(result: "Result") -> str:
+def settling_words(result: Result) -> str:
     """Return the time that a robot takes from rest to the limit cycle, in words."""
     from geomech.studies.walking import NEAR
 
@@ -145,10 +144,8 @@ def settling_words(result: "Result") -> str:
     return f"; from rest {within} after {time:.2g} s"
 
 
-def motion_words(result: "Result") -> str:
+def motion_words(result: Result) -> str:
     """Return where the robot went and how far it turned."""
-    import numpy as np
-
     t, x, z = (result[name].values for name in ("t", "x", "z"))
     words = f"t = 0 to {t[-1]:.4g} s: x to {x[-1]:.4g} m"
     if "y" in result:
