@@ -232,8 +232,8 @@ class Study:
 
 
 def study(*parts: Any, effects: Sequence = (), **numerics: Any) -> Study:
-    """Return the study of a scene: `study("three-link-glass")`, of a TOML file, a Scene,
-    or its parts: `study(medium, body, gait)`, `study(system, gait)`,
+    """Return the study of a scene: `study("three-link-glass")`, of a TOML file, a
+    Scene, or its parts: `study(medium, body, gait)`, `study(system, gait)`,
     `study(velocity, gait)`. See `Study`.
 
     Examples

@@ -17,7 +17,8 @@ from geomech.options import PluginOption, load_plugins, with_plugins, with_worke
 
 
 class Commands(Mapping[str, Any]):
-    """All commands by their names as they are typed; each is loaded at its first use."""
+    """All commands by their names as they are typed; each is loaded at its first
+    use."""
 
     def __iter__(self) -> Iterator[str]:
         return (typed(name) for names in headings().values() for name in names)
@@ -120,14 +121,15 @@ def geomech(
     """Geometric mechanics of locomotion: from a force law to displacement."""
     from geomech.run.backend import prefer
 
-    # NumPy's first call takes half a second less; the pipeline knows who has much to do.
+    # NumPy's first call takes half a second less; the pipeline knows who has much to
+    # do.
     prefer("numpy")
     load_plugins(plugin)
 
 
 def main(argv: list[str] | None = None) -> None:
-    """Run a command and exit: one line on standard error and code 2 for a mistake, 128 +
-    its number for a signal."""
+    """Run a command and exit: one line on standard error and code 2 for a mistake, 128
+    + its number for a signal."""
     terminal.limit_threads()
     arguments = (sys.argv[1:] if argv is None else argv) or ["--help"]
     # What the command prefers ends with its context.

@@ -96,8 +96,8 @@ def command(question: type[Question]) -> Callable[..., None]:
 
 def parameters(declared: Declaration) -> list[inspect.Parameter]:
     """Return the parameters of a command in the order of its help: the subject, the
-    question's own, those that change the subject, those of pictures and files, and those
-    of every command."""
+    question's own, those that change the subject, those of pictures and files, and
+    those of every command."""
     found = []
     changes: tuple[str, ...] = ()
     if declared.subject is not None:

@@ -1,5 +1,5 @@
-"""Options of commands besides the fields of their questions: plug-ins, workers, and changes
-of a scene."""
+"""Options of commands besides the fields of their questions: plug-ins, workers, and
+changes of a scene."""
 
 from __future__ import annotations
 
@@ -85,8 +85,8 @@ def load_plugins(files: list[Path] | None) -> None:
 
 
 def with_plugins(command: Callable) -> Callable:
-    """Return a command that also takes ``--plugin`` if it is about a scene; any other as
-    it is."""
+    """Return a command that also takes ``--plugin`` if it is about a scene; any other
+    as it is."""
     taken = {*inspect.signature(command).parameters}
     if not ABOUT & taken or "plugin" in taken:
         return command
@@ -135,7 +135,8 @@ def with_workers(command: Callable) -> Callable:
 
 
 def extended(run: Callable, command: Callable, more: dict[str, Any]) -> Callable:
-    """Return ``run`` as a command with the parameters of another one and more options."""
+    """Return ``run`` as a command with the parameters of another one and more
+    options."""
     functools.update_wrapper(run, command)
     signature = inspect.signature(command, eval_str=True)
     parameters = [*signature.parameters.values()]

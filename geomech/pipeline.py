@@ -104,7 +104,8 @@ def contents(folders: Iterable[Path]) -> list[str]:
 def computing(
     question: Question, outputs: Sequence[Output], inputs: list[Path], yes: bool
 ) -> Iterator[Callable]:
-    """Yield the function that shows the progress of a question, once its cost is allowed.
+    """Yield the function that shows the progress of a question, once its cost is
+    allowed.
 
     Finished tasks are stored next to its first output or, of results that are only
     printed, in the user's cache folder; the same command resumes from there."""
@@ -129,8 +130,8 @@ def takes_time(question: Question) -> bool:
 
 
 def allow(question: Question, cost: Cost, yes: bool) -> None:
-    """Print the cost of a question if it takes long; Refusal, with what to do instead, if
-    it takes too long to begin without --yes: here, or in its first second
+    """Print the cost of a question if it takes long; Refusal, with what to do instead,
+    if it takes too long to begin without --yes: here, or in its first second
     (`geomech.run.cost.decide`). From here on "auto" is the back end for that many
     balances."""
     name = question.subject_name
@@ -182,7 +183,8 @@ def storing(
 
 
 def refuse_unwritable(outputs: Sequence[Output], inputs: list[Path]) -> None:
-    """Refuse outputs that cannot be written, that are inputs, or that are named twice."""
+    """Refuse outputs that cannot be written, that are inputs, or that are named
+    twice."""
     files = [output.path for output in outputs if not output.folder]
     for k, path in enumerate(files):
         if path in files[:k]:
@@ -203,8 +205,8 @@ class _Unused(Exception):
 
 @contextlib.contextmanager
 def place(output: Output, inputs: list[Path]) -> Iterator[Path]:
-    """Yield the path to write to: a folder is filled elsewhere, and appears whole or not
-    at all."""
+    """Yield the path to write to: a folder is filled elsewhere, and appears whole or
+    not at all."""
     if not output.folder:
         yield output.path
         return

@@ -25,8 +25,8 @@ OPTIONS = {
 
 
 def current(words: list[str]) -> list[str]:
-    """Return a command's name and its arguments in the current spelling; `Note` for each
-    old one."""
+    """Return a command's name and its arguments in the current spelling; `Note` for
+    each old one."""
     name, *arguments = words
     last = len(arguments)
     if "--" in arguments:  # what follows are no options

@@ -174,8 +174,8 @@ def collected_notes() -> Iterator[dict[str, str]]:
 
 
 def run(app: typer.Typer, argv: list[str], notes: dict[str, str]) -> int:
-    """Run a command and return its exit code. notes: collected meanwhile; the line of an
-    error ends with them."""
+    """Run a command and return its exit code. notes: collected meanwhile; the line of
+    an error ends with them."""
     try:
         code = app(args=argv, prog_name="geomech", standalone_mode=False)
         if code == INTERRUPTED:  # an interrupt that typer caught
@@ -251,8 +251,8 @@ def system_error(error: OSError) -> str:
 
 
 def stopped(stop: BaseException, argv: list[str]) -> int:
-    """Report what is stored, as the notes of ``stop`` say, and the command that resumes;
-    return the exit code."""
+    """Report what is stored, as the notes of ``stop`` say, and the command that
+    resumes; return the exit code."""
     command = shlex.join(["geomech", *argv])
     stored = "; ".join(getattr(stop, "__notes__", ()))
     if stored:

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 
 def scene_lines(scene: Intruding | WalkerScene) -> list[str]:
-    """Return lines on the body and its motion, or the robot, its gait and its engine; on
-    the medium; and on the effects that are on and off."""
+    """Return lines on the body and its motion, or the robot, its gait and its engine;
+    on the medium; and on the effects that are on and off."""
     name = in_line(scene.name)
     if hasattr(scene, "robot"):
         lines = [

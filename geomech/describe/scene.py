@@ -1,4 +1,5 @@
-"""A scene in lines: its system, effects and engine, its cost, and the results that exist."""
+"""A scene in lines: its system, effects and engine, its cost, and the results that
+exist."""
 
 from __future__ import annotations
 
@@ -27,8 +28,8 @@ ANY_NUMBER = 100  # joints; a tier that takes this many takes any number
 
 
 def description(scene: Scene | Intruding | WalkerScene) -> str:
-    """Return a scene as plain text: the system with its effects on and off, the engine and
-    why, and the results that exist.
+    """Return a scene as plain text: the system with its effects on and off, the engine
+    and why, and the results that exist.
 
     Of an intruder scene: law, body and motion, and effects on and off; of a robot that
     walks also its engine."""

@@ -27,8 +27,8 @@ def symbolic(
         bool, typer.Option(help="print the CCF of every two joints, too")
     ] = True,
 ):
-    """Print connection and CCF in closed form. Chains in a viscous or ideal fluid, afloat
-    and on wheels have one."""
+    """Print connection and CCF in closed form. Chains in a viscous or ideal fluid,
+    afloat and on wheels have one."""
     terminal.show(formulas(load_scene(name), ccf, latex))
 
 

@@ -1,5 +1,5 @@
-"""A system in words: its parts with their numbers and cost, its engine, and notes on how
-it is computed."""
+"""A system in words: its parts with their numbers and cost, its engine, and notes on
+how it is computed."""
 
 from __future__ import annotations
 
@@ -165,7 +165,8 @@ def table_lines(system: Table) -> list[str]:
 
 
 def field_line(system: Table) -> str:
-    """Return what a table has besides A: a tube around a gait, harmonics, or nothing."""
+    """Return what a table has besides A: a tube around a gait, harmonics, or
+    nothing."""
     stored = system.stored
     if system.tube is not None:
         level = system.tube.taylor.level
@@ -184,8 +185,8 @@ def field_line(system: Table) -> str:
 
 
 def comparison_lines(system: Table) -> list[str]:
-    """Return how far the fields that sysplotter computed are from ours; [] where none is
-    compared."""
+    """Return how far the fields that sysplotter computed are from ours; [] where none
+    is compared."""
     found = []
     for name, difference in compared(system.original).items():
         found.append(f"{name} {100 * difference:.2g} %")

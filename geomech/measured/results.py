@@ -1,5 +1,5 @@
-"""Results of a measured gait: displacements as logged and by the connection near it, A along
-it, and all data of a look-up there."""
+"""Results of a measured gait: displacements as logged and by the connection near it, A
+along it, and all data of a look-up there."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ DOTS = 4000  # rows of the log, at most, whose shapes a picture shows
 
 
 def status(fit: Fitted) -> str:
-    """Return which part of A is determined and, if not all, why; with the cure where joints depend on each other."""
+    """Return which part of A is determined and, if not all, why; with the cure where
+    joints depend on each other."""
     if fit.across:
         return "fitted"
     if not fit.combined:
@@ -46,8 +47,8 @@ def _sum(fit: Fitted, factors: np.ndarray) -> str:
 
 
 def of_fit(fit: Fitted, mapped: bool = True) -> Result:
-    """Return all numbers of a measured gait. mapped: with A and its error on a grid, and
-    the CCF of two joints, nan where there are no data.
+    """Return all numbers of a measured gait. mapped: with A and its error on a grid,
+    and the CCF of two joints, nan where there are no data.
 
     `Connection.load` and [system] kind = "table" read a file of it that is mapped."""
     variables = [

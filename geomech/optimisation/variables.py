@@ -25,7 +25,8 @@ HOW = ("refined", "by a table alone")
 
 
 def attributes(optimum: Optimum) -> dict[str, Any]:
-    """Return the objective with its limits, and the scene with the best gait as text."""
+    """Return the objective with its limits, and the scene with the best gait as
+    text."""
     objective = optimum.request.objective
     facts: dict[str, Any] = {
         "objective": objective.name,

@@ -25,15 +25,15 @@ SHOWN = (
     "best_seconds",
     "coarsest_value",
 )
-MOST_RUNS = 1000  # assumed
+LARGEST_RUNS = 1000  # of one setting; assumed
 ERRORS = ("error", "force_error", "moment_error")
 
 
 @dataclass(frozen=True)
 class Accuracy(Question):
     """Measure error against time for every tier and setting. The cheapest settings that
-    meet an error are listed. The settings of an intruder scene are numbers of elements or
-    triangles; of a robot, steps, elements and rounding."""
+    meet an error are listed. The settings of an intruder scene are numbers of elements
+    or triangles; of a robot, steps, elements and rounding."""
 
     scene: Annotated[
         "Scene | Intruding | WalkerScene",
@@ -56,7 +56,7 @@ class Accuracy(Question):
 
     def check(self) -> None:
         if self.runs is not None:
-            in_range("runs", self.runs, 1, MOST_RUNS, whole=True)
+            in_range("runs", self.runs, 1, LARGEST_RUNS, whole=True)
         self.adjustable.check()
 
     def cost(self) -> Cost:
@@ -83,9 +83,9 @@ class Accuracy(Question):
     def remarks(result: Result) -> list[str]:
         lines = []
         if "own_error" in result:
-            own = size(float(result["own_error"]))
+            system_error = size(float(result["own_error"]))
             lines.append(
-                f"errors in the table include the system's own, {own} BL, which no "
+                f"errors in the table include the system's own, {system_error} BL, which no "
                 "setting takes away; those below do not"
             )
         for k in range(result.sizes["setting"]):
@@ -104,27 +104,27 @@ class Accuracy(Question):
 
 
 def setting_words(result: Result, k: int, name: str) -> str:
-    """Return in a sentence what a setting gains: its coarsest and its finest value, their
-    errors and seconds, and the measured order."""
+    """Return in a sentence what a setting gains: its coarsest and its finest value,
+    their errors and seconds, and the measured order."""
     values = ends(result, k, "value")
-    errors, seconds = ends(result, k, name), ends(result, k, "seconds")
+    errors = ends(result, k, name)
+    seconds = ends(result, k, "seconds")
     about = name.replace("_", " ")
     unit = error_words(result, name)
     if str(result["against"][k]) == "limit":
         unit = f"{unit} against its own limit"
-    words = [
+    words = (
         f"{result['setting'][k]} {number(values[0])} to {number(values[1])}: "
         f"{about} {size(errors[0])} to {size(errors[1])}{unit} "
         f"in {number(seconds[0])} to {number(seconds[1])} s"
-    ]
+    )
     if "buys" in result:
-        words.append(f"; buys {result['buys'][k]}")
-    words.append(f" ({order_words(result, k, name)})")
-    return "".join(words)
+        words = f"{words}; buys {result['buys'][k]}"
+    return f"{words} ({order_words(result, k, name)})"
 
 
 def ends(result: Result, k: int, name: str) -> tuple[float, float]:
-    """Return what a setting has at its coarsest and at its finest value."""
+    """Return a variable of a setting at its coarsest and at its finest value."""
     row = result[name][k]
     row = row[np.isfinite(result["value"][k])]
     return float(row[0]), float(row[-1])

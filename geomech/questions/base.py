@@ -35,8 +35,9 @@ SCENE_HELP = "built-in name (see 'geomech scenes') or TOML file"
 class Option:
     """What a field means, and how a command line gives it.
 
-    help: a line. metavar: what stands for its value. parse: returns the value of a text;
-    without it the type of the field is read. flag: its name there, if it is another.
+    help: a line. metavar: what stands for its value. parse: returns the value of a
+    text; without it the type of the field is read. flag: its name there, if it is
+    another.
     repeated: it may be given more than once, and a list of texts is parsed."""
 
     help: str
@@ -51,8 +52,8 @@ class Subject:
     """What a question is about, as its command's first argument: mostly a scene.
 
     load: returns it from its text and from the values of ``changes``, options of the
-    command that change it (`geomech.command.CHANGES`). names: returns those that a shell
-    completes. default: what is taken where nothing is given; "" if it must be."""
+    command that change it (`geomech.command.CHANGES`). names: returns those that a
+    shell completes. default: what is taken where nothing is given; "" if it must be."""
 
     load: Callable[..., Any]
     names: Callable[[], list[str]] | None = None
@@ -70,10 +71,10 @@ def ignore(_: Any) -> None:
 class Run:
     """What a computation is given besides its question.
 
-    progress: called with the fraction done. allow: called with a cost that was not known
-    beforehand; raises where it is too much. limited: whether limits of cost hold, for a
-    computation that can check them only on its way. tables: of the scene, if there are
-    some already."""
+    progress: called with the fraction done. allow: called with a cost that was not
+    known beforehand; raises where it is too much. limited: whether limits of cost hold,
+    for a computation that can check them only on its way. tables: of the scene, if
+    there are some already."""
 
     progress: Progress = ignore
     allow: Allow = ignore
@@ -135,8 +136,8 @@ class Question(Plain):
 
     @property
     def subject(self) -> Any:
-        """What the question is about: the value of its field marked `Subject`; None of a
-        question that has none."""
+        """What the question is about: the value of its field marked `Subject`; None of
+        a question that has none."""
         name, _ = subject_field(type(self))
         if not name:
             return None
@@ -187,8 +188,8 @@ class Question(Plain):
         return dataclasses.replace(result, attributes=facts, question=self)
 
     def ask(self, tables: Any = None) -> "Result":
-        """Return the answer without limits of cost, as from Python. tables: of the scene,
-        if there are some already."""
+        """Return the answer without limits of cost, as from Python. tables: of the
+        scene, if there are some already."""
         self.check()
         return self.answer(Run(self.progress or ignore, tables=tables))
 
@@ -213,8 +214,8 @@ def subject_facts(subject: Any) -> dict[str, str]:
 
 
 def subject_field(question: type[Question]) -> tuple[str, Subject | None]:
-    """Return the name of the field that a question is about, and what it is; "" and None
-    of a question that consists of options alone."""
+    """Return the name of the field that a question is about, and what it is; "" and
+    None of a question that consists of options alone."""
     for field in dataclasses.fields(question):
         subject = marked(field.type, Subject)
         if subject is not None:

@@ -1,5 +1,5 @@
-"""The curvature constraint function of a scene, and its integral over the scene's gait; of
-more than two joints its slices, where two joints move."""
+"""The curvature constraint function of a scene, and its integral over the scene's gait;
+of more than two joints its slices, where two joints move."""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -24,8 +24,8 @@ POSE = ("x", "y", "heading")
 
 @dataclass(frozen=True)
 class Ccf(Question):
-    """Compute the CCF and its integral over the scene's gait. --plot draws both. Of three
-    and more joints: a slice for each pair, or for one, with the others fixed."""
+    """Compute the CCF and its integral over the scene's gait. --plot draws both. Of
+    three and more joints: a slice for each pair, or for one, with the others fixed."""
 
     scene: Annotated[
         "Scene", Subject(loading.load_scene, names.scene_names, ("grid", "extent"))
@@ -58,8 +58,9 @@ class Ccf(Question):
 
     @property
     def title(self) -> str:
-        what = "planes" if self.sliced else "field"
-        return f"{what} of {self.scene.name}"
+        if self.sliced:
+            return f"planes of {self.scene.name}"
+        return f"field of {self.scene.name}"
 
     @property
     def less(self) -> str:  # type: ignore[override]

@@ -76,8 +76,8 @@ def with_contents(result: Result, ending: str, layout: str | None = None) -> Res
 
 @dataclass(frozen=True)
 class Connection(Question):
-    """Compute the local connection on a grid. A NetCDF file has the fit residual and the
-    CCF, too; a .mat file has A and the metric, in a layout of sysplotter's."""
+    """Compute the local connection on a grid. A NetCDF file has the fit residual and
+    the CCF, too; a .mat file has A and the metric, in a layout of sysplotter's."""
 
     scene: Annotated[
         "Scene", Subject(loading.load_scene, names.scene_names, ("grid", "extent"))
@@ -121,8 +121,10 @@ class Connection(Question):
         from geomech.studies.shape_space import Plan
 
         file = ""
-        if self.contents:
-            file = WHOLE if WHOLE in self.contents else self.contents[0]
+        if WHOLE in self.contents:
+            file = WHOLE
+        elif self.contents:
+            file = self.contents[0]
         return Plan(
             run.tables_of(self.scene),
             file,
@@ -137,14 +139,14 @@ class Connection(Question):
         from geomech.io.tables import FORMATS
         from geomech.studies import fields
 
-        wanted = []
+        found = []
         for path in paths:
             ending = path.suffix.lower()
             if ending in self.files() or ending == ".nc":
                 check_settings(self.scene, ending, options)
                 layout = options.get("layout")
-                wanted.append(fields.contents(FORMATS[ending], layout))
-        return replace(self, contents=tuple(dict.fromkeys(wanted)))
+                found.append(fields.contents(FORMATS[ending], layout))
+        return replace(self, contents=tuple(dict.fromkeys(found)))
 
     def for_picture(self, **options: Any) -> Question:
         return replace(self, drawn=True)
@@ -226,7 +228,8 @@ class Connection(Question):
         if facts.get("symmetries"):
             lines += [f"symmetry: {one}" for one in facts["symmetries"].split("; ")]
         if "balances" in result and int(result["balances"].values):
-            balances, seconds = int(result["balances"].values), float(result["seconds"])
+            balances = int(result["balances"].values)
+            seconds = float(result["seconds"])
             lines.append(f"cost: {balances:,} force balances, {seconds:.2g} s")
         return lines
 
@@ -241,7 +244,8 @@ class Connection(Question):
         clim: ColourLimit = None,
         ax: Any = None,
     ) -> Any:
-        """Draw the rows of A as arrows or streamlines over shape space; return the Figure.
+        """Draw the rows of A as arrows or streamlines over shape space; return the
+        Figure.
 
         On Axes that are given draw one row, x by default; return the Axes."""
         from geomech import plots

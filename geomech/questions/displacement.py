@@ -1,5 +1,5 @@
-"""The net displacement of a gait per cycle: by each tier with its error, or by the cheapest
-that is accurate enough."""
+"""The net displacement of a gait per cycle: by each tier with its error, or by the
+cheapest that is accurate enough."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 
 POSE = ("x", "y", "heading")
 EFFORT = ("path_length", "work", "cost_of_transport")
-COMPARED = 4  # amplitudes up to which the other tiers' x is shown
+LARGEST_COMPARED = 4  # amplitudes up to which the other tiers' x is shown
 FRAME = "x ahead, y to the left, as the body frame points at the start of the cycle"
 
 
 @dataclass(frozen=True)
 class Displacement(Question):
-    """Compute the displacement of a gait by each tier. x, y and heading after a cycle from
-    phase t = 0, each with an estimated error."""
+    """Compute the displacement of a gait by each tier. x, y and heading after a cycle
+    from phase t = 0, each with an estimated error."""
 
     scene: Annotated[
         "Scene",
@@ -143,8 +143,8 @@ class Displacement(Question):
         tiers = result["tier"].values.tolist()
         shown = result.at(tier=tiers[index]).only(*POSE, "speed", *EFFORT)
         others = [name for name in tiers if name != tiers[index]]
-        few = result.sizes["amplitude"] <= COMPARED
-        if not others or result["x"].zero or not few:
+        is_short = result.sizes["amplitude"] <= LARGEST_COMPARED
+        if not others or result["x"].zero or not is_short:
             return without_undefined(shown)
         is_other = [name in others for name in tiers]
         x = tools.selected(result["x"], "tier", is_other)
@@ -156,7 +156,10 @@ class Displacement(Question):
     def remarks(result: Result) -> list[str]:
         facts = result.attributes
         lines = []
-        if result.sizes["amplitude"] > COMPARED and len(result["tier"].values) > 1:
+        if (
+            result.sizes["amplitude"] > LARGEST_COMPARED
+            and len(result["tier"].values) > 1
+        ):
             lines.append(errors_of_others(result))
         if "speed" in result:
             frequency = facts["frequency"]
@@ -197,8 +200,8 @@ class Displacement(Question):
 
 
 def points(data: Any, scene: Any, component: Sequence[str]) -> Any:
-    """Return measurements to be drawn: those of a file, which are of the quantity of one
-    panel, or values as they are."""
+    """Return measurements to be drawn: those of a file, which are of the quantity of
+    one panel, or values as they are."""
     from pathlib import Path
 
     from geomech.questions.texts import measurements
@@ -209,8 +212,8 @@ def points(data: Any, scene: Any, component: Sequence[str]) -> Any:
 
 
 def without_undefined(result: Result) -> Result:
-    """Return the result without variables that are nothing but nan, such as the work of a
-    system that has none."""
+    """Return the result without variables that are nothing but nan, such as the work of
+    a system that has none."""
     undefined = []
     for v in result.variables:
         if v.values.dtype.kind == "f" and v.values.size and np.isnan(v.values).all():
@@ -219,15 +222,16 @@ def without_undefined(result: Result) -> Result:
 
 
 def exact_tier(result: Result) -> int:
-    """Return the number of the tier whose largest error of position is least, the last of
-    several."""
+    """Return the number of the tier whose largest error of position is least, the last
+    of several."""
     errors = np.nan_to_num(result["x"].error, nan=np.inf).max(1, initial=0.0)
     return len(errors) - 1 - int(errors[::-1].argmin())
 
 
 def tier_words(result: Result) -> str:
     """Return the name of the tier that is shown, and why it is this one."""
-    tiers, facts = result["tier"].values.tolist(), result.attributes
+    facts = result.attributes
+    tiers = result["tier"].values.tolist()
     name = tiers[exact_tier(result)]
     if "tolerance" in facts:
         return f"{name} tier, cheapest within {facts['tolerance']:g} BL"
@@ -244,7 +248,8 @@ def amplitude_words(result: Result) -> str:
 def errors_of_others(result: Result) -> str:
     """Return the largest errors of the tiers that are not shown."""
     shown = exact_tier(result)
-    x, words = result["x"], []
+    x = result["x"]
+    words = []
     for k, tier in enumerate(result["tier"].values.tolist()):
         if k != shown:
             words.append(f"{tier} {size(float(x.error[k].max(initial=0.0)))}")
@@ -252,7 +257,8 @@ def errors_of_others(result: Result) -> str:
 
 
 def shift_words(result: Result) -> Iterable[str]:
-    """Yield how far uncertain media shift the mean of a quantity, where that matters."""
+    """Yield how far uncertain media shift the mean of a quantity, where that
+    matters."""
     from geomech.studies.uncertainty import SEEN, SHIFTED
 
     length = result.attributes["body_length"]

@@ -39,20 +39,26 @@ def write_drag(path: Path, result: Result) -> None:
     lines = [f"# {line}" for line in about]
     lines.append(",".join(COLUMNS))
     length = float(result["rod_length"])
-    flank, ends, lift = result["flank"], result["ends"], result["lift"]
+    flank = result["flank"]
+    ends = result["ends"]
+    lift = result["lift"]
     for i, seed in enumerate(result["bed"].values):
         for j, psi in enumerate(result["attack_angle"].values):
-            here = (slice(None), i, j)
-            forces = [*(length * flank[here]), *ends[here], lift[i, j]]
-            errors = [*(length * flank.error[here]), *ends.error[here]]
+            index = (slice(None), i, j)
+            forces = [*(length * flank[index]), *ends[index], lift[i, j]]
+            errors = [*(length * flank.error[index]), *ends.error[index]]
             cells = [
                 f"{psi:g}",
-                *(f"{force:.4f}" for force in forces),
+                *map(newtons, forces),
                 f"{seed}",
-                *(f"{error:.4f}" for error in errors),
+                *map(newtons, errors),
             ]
             lines.append(",".join(cells))
     write_text(path, "\n".join(lines) + "\n")
+
+
+def newtons(force: float) -> str:
+    return f"{force:.4f}"
 
 
 @dataclass(frozen=True)
@@ -163,8 +169,8 @@ class DragGrains(Question):
     def remarks(result: Result) -> list[str]:
         overlap = float(result["largest_overlap"])
         return [
-            f"errors of drag: {result['mean_lift'].error_label}; of the law: half widths "
-            "of intervals with 95 %",
+            f"errors of drag: {result['mean_lift'].error_label}; of the law: half "
+            "widths of intervals with 95 %",
             f"largest overlap {overlap:.3f} grain diameters",
             "-o FILE.csv writes a file for 'geomech fit-medium'",
         ]

@@ -1,5 +1,5 @@
-"""A measured gait: a log of joint angles gives the connection near its mean gait, tracked
-midlines the kinematics of a trial, beside those that a medium predicts."""
+"""A measured gait: a log of joint angles gives the connection near its mean gait,
+tracked midlines the kinematics of a trial, beside those that a medium predicts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -24,15 +24,15 @@ SCENE = ".toml"
 
 
 def write_scene(path: Path, result: Result, *, field: Path | None = None) -> None:
-    """Write a scene of the mean gait of a log, which takes the connection from a file of
-    the result. field: that file; by default the one that the command writes, or of the
-    scene's name with the ending .nc."""
+    """Write a scene of the mean gait of a log, which takes the connection from a file
+    of the result. field: that file; by default the one that the command writes, or of
+    the scene's name with the ending .nc."""
     from geomech.results.measured import scene_text
 
-    asked = getattr(result.question, "connection_file", None)
+    written = getattr(result.question, "connection_file", None)
     if field is None:
-        field = asked or path.with_suffix(".nc")
-    if field != asked and not field.exists():
+        field = written or path.with_suffix(".nc")
+    if field != written and not field.exists():
         raise Refusal(
             f"there is no {field}",
             because="a scene of a mean gait takes its connection from a file",
@@ -43,10 +43,11 @@ def write_scene(path: Path, result: Result, *, field: Path | None = None) -> Non
 
 @dataclass(frozen=True)
 class FitGait(Question):
-    """Fit a measured gait. A log of joint angles gives the connection near its mean gait,
-    with intervals; tracked midlines give speed, heading, slip, wave efficiency, amplitude
-    and wavelength, each with an interval, and in a medium the same as predicted. -o
-    FIELD.nc -o SCENE.toml writes the connection and a scene of the mean gait."""
+    """Fit a measured gait. A log of joint angles gives the connection near its mean
+    gait, with intervals; tracked midlines give speed, heading, slip, wave efficiency,
+    amplitude and wavelength, each with an interval, and in a medium the same as
+    predicted. -o FIELD.nc -o SCENE.toml writes the connection and a scene of the mean
+    gait."""
 
     file: Annotated[
         "str | Path | Log | Trial",
@@ -125,7 +126,9 @@ class FitGait(Question):
         return None
 
     def inputs(self) -> list[Path]:
-        found = [self.path] if self.path else []
+        found = []
+        if self.path is not None:
+            found.append(self.path)
         if isinstance(self.medium, str | Path) and Path(self.medium).is_file():
             found.append(Path(self.medium))
         return found
@@ -138,8 +141,10 @@ class FitGait(Question):
                 f"{scenes[0]} takes the connection from one file",
                 instead="say -o FIELD.nc, too",
             )
-        taken = fields[0] if scenes else None
-        return replace(self, mapped=bool(paths), connection_file=taken)
+        connection_file = None
+        if scenes:
+            connection_file = fields[0]
+        return replace(self, mapped=bool(paths), connection_file=connection_file)
 
     @cached_property
     def form(self) -> str:

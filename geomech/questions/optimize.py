@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 SHOWN = ("x", "y", "heading", "path_length", "work", "frequency")
 ANSWERS = ("answer", "answer_value", "answer_starts", "answer_how")
-COMMENT = 86  # characters of a line above the scene
-SAME = 1e-12  # relative: a value that is no better
+COMMENT_WIDTH = 86  # characters of a line above the scene
+BETTER = 1e-12  # relative difference from which on a value is better
 
 
 def write_scene(path: Path, result: Result) -> None:
@@ -33,15 +33,15 @@ def write_scene(path: Path, result: Result) -> None:
             instead="write the result to another format, such as .nc",
         )
     first, second, *_ = Optimize.headline(result)
-    about = textwrap.wrap(f"{first} ({second})", COMMENT)
+    about = textwrap.wrap(f"{first} ({second})", COMMENT_WIDTH)
     comment = "".join(f"# {line}\n" for line in about)
     write_text(path, f"{comment}\n{result.attributes['best_scene_toml']}")
 
 
 @dataclass(frozen=True)
 class Optimize(Question):
-    """Find the best gait for an objective. Its value has an error; -o FILE.toml writes it
-    as a scene, --plot draws its loop on the CCF."""
+    """Find the best gait for an objective. Its value has an error; -o FILE.toml writes
+    it as a scene, --plot draws its loop on the CCF."""
 
     scene: Annotated["Scene", Subject(loading.load_scene, names.scene_names)]
     objective: Annotated[
@@ -71,7 +71,8 @@ class Optimize(Question):
     power: Annotated[
         float | None, Option("largest mean power in drag x BL/s, for speed", "POWER")
     ] = None
-    # Whether the CCF that the gait gains is computed, and the stretched one: for pictures.
+    # For pictures: whether the CCF that the gait gains is computed, and the stretched
+    # one.
     mapped: bool = field(default=True, kw_only=True, compare=False)
     stretched: bool = field(default=False, kw_only=True, compare=False)
 
@@ -98,8 +99,8 @@ class Optimize(Question):
         )
 
     def for_files(self, paths: list[Path], options: dict[str, Any]) -> Question:
-        kept = [path for path in paths if path.suffix != ".toml"]
-        return replace(self, mapped=bool(kept))
+        results = [path for path in paths if path.suffix != ".toml"]
+        return replace(self, mapped=bool(results))
 
     def for_picture(self, stretch: bool = False, **options: Any) -> Question:
         return replace(self, mapped=True, stretched=stretch)
@@ -137,15 +138,16 @@ class Optimize(Question):
 
     @staticmethod
     def headline(result: Result) -> list[str]:
-        facts, value = result.attributes, result["value"]
-        sought = facts["objective"]
+        facts = result.attributes
+        value = result["value"]
+        objective = facts["objective"]
         if "direction" in facts:
-            sought = f"{sought} along {facts['direction']}"
+            objective = f"{objective} along {facts['direction']}"
         lines = [
-            f"{facts['scene']}: best {sought} {scalar(value)}",
+            f"{facts['scene']}: best {objective} {scalar(value)}",
             f"the scene's gait: {scalar(result['start_value'])}",
         ]
-        if float(value) <= float(result["start_value"]) * (1 + SAME):
+        if float(value) <= float(result["start_value"]) * (1 + BETTER):
             lines.append("nothing better than the scene's own gait was found")
         return lines
 
@@ -169,7 +171,8 @@ class Optimize(Question):
         touched = "none"
         if "limit_touched" in result:
             touched = ", ".join(result["limit_touched"].values.tolist())
-        cycles, seconds = int(result["evaluations"].values), float(result["seconds"])
+        cycles = int(result["evaluations"].values)
+        seconds = float(result["seconds"])
         return [
             *lines,
             f"limits touched: {touched}",

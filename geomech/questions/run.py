@@ -1,5 +1,5 @@
-"""All of a scene into a folder: connection, CCF, and displacements against amplitude, as
-numbers and pictures."""
+"""All of a scene into a folder: connection, CCF, and displacements against amplitude,
+as numbers and pictures."""
 
 import os
 from dataclasses import dataclass, replace
@@ -23,7 +23,10 @@ from rft.core.refusal import Refusal
 if TYPE_CHECKING:
     from geomech.scenes.model import Scene
 
-SCENE, TABLES, FIELD = "scene.toml", "displacement.json", "connection.nc"
+# Files of the folder.
+SCENE = "scene.toml"
+TABLES = "displacement.json"
+FIELD = "connection.nc"
 FIGURES = (".png", ".pdf")
 DEFAULT = "three-link-glass"
 HELP = "built-in name or TOML file"
@@ -113,8 +116,8 @@ class Run(Question):
         (_, own), *others = tables_of(result).items()
         lines = Displacement.remarks(own)
         for gait, table in others:
-            told = Displacement.remarks(table)
-            lines += [f"{gait}: {line}" for line in told if line not in lines]
+            remarks = Displacement.remarks(table)
+            lines += [f"{gait}: {line}" for line in remarks if line not in lines]
         return lines
 
     @staticmethod
@@ -139,8 +142,8 @@ class Run(Question):
         clim: ColourLimit = None,
         data: Data = None,
     ) -> None:
-        """Write the scene, the displacements and the connection with their pictures into
-        a folder."""
+        """Write the scene, the displacements and the connection with their pictures
+        into a folder."""
         from geomech.results.files import save
         from geomech.results.scenes import scene_of
         from geomech.scenes.write import toml
@@ -157,8 +160,8 @@ class Run(Question):
 
 
 def save_maps(result: Result, folder: Path, component: Any, clim: Any) -> None:
-    """Draw the connection and the CCF, of three joints for every pair, and the frame that
-    was chosen, if it is one of those."""
+    """Draw the connection and the CCF, of three joints for every pair, and the frame
+    that was chosen, if it is one of those."""
     from geomech import plots
     from geomech.results.fields import connection_of, field_of, slices_of
     from geomech.results.scenes import scene_of
@@ -201,7 +204,7 @@ def refuse_folder(scene: Any, folder: Path) -> None:
     refuse_inputs([path, folder / TABLES], inputs(scene))
     if not os.path.lexists(path) or os.path.lexists(folder / TABLES):
         return
-    if not holds(path, toml(scene)):
+    if not has_text(path, toml(scene)):
         raise Refusal(
             f"cannot write {path}",
             because="another scene stands there",
@@ -209,7 +212,7 @@ def refuse_folder(scene: Any, folder: Path) -> None:
         )
 
 
-def holds(path: Path, text: str) -> bool:
+def has_text(path: Path, text: str) -> bool:
     """Return whether a file has this text and no more."""
     try:
         return read(path, 4 * len(text) + 4) == text.encode()

@@ -5,16 +5,11 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from geomech.core.variables import Result
-from geomech.questions import names
+from geomech.questions import loading, names
 from geomech.questions.base import Option, Question, Run, Subject
 from geomech.results.numbers import number
 
 HELP = "name (see 'geomech scenes'), TOML or CSV of plate drags"
-
-
-def named(medium: str) -> str:
-    """Return the name of a medium as it is: it is read when it is asked."""
-    return medium
 
 
 @dataclass(frozen=True)
@@ -22,7 +17,9 @@ class Stress(Question):
     """Compute the stress of grains on a plate per unit depth. In N/cm^3, backwards
     (alpha_x) and upwards (alpha_z), as in Fig. 7."""
 
-    medium: Annotated[str, Subject(named, names.medium_names, (), "MEDIUM", HELP)]
+    medium: Annotated[
+        str, Subject(loading.as_typed, names.medium_names, (), "MEDIUM", HELP)
+    ]
     beta: Annotated[
         float | None,
         Option("tilt of the plate in degrees, 0 if it lies flat", "ANGLE"),
@@ -74,8 +71,7 @@ class Stress(Question):
 
     @staticmethod
     def draw(result: Result) -> Any:
-        """Draw the stress map, and the plate that was asked for on it; return the
-        Figure."""
+        """Draw the stress map with the plate of the question; return the Figure."""
         from geomech import plots
         from geomech.studies import stress
 

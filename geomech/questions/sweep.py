@@ -1,4 +1,5 @@
-"""Displacement of a gait, or speed of a robot, over a grid of parameters of the scene."""
+"""Displacement of a gait, or speed of a robot, over a grid of parameters of the
+scene."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,13 +18,13 @@ if TYPE_CHECKING:
     from geomech.studies.sweep import Plan
 
 SHOWN = ("net_distance", "speed", "status")
-DRAWN = 2  # parameters of a figure at most
+LARGEST_DRAWN = 2  # parameters of a figure
 
 
 @dataclass(frozen=True)
 class Sweep(Question):
-    """Compute displacement or speed over a grid of parameters. Speeds are those of walking
-    robots. A repeated command resumes an interrupted one."""
+    """Compute displacement or speed over a grid of parameters. Speeds are those of
+    walking robots. A repeated command resumes an interrupted one."""
 
     scene: Annotated["Scene", Subject(loading.load_moving, names.scene_names)]
     over: Annotated[
@@ -35,7 +36,8 @@ class Sweep(Question):
             repeated=True,
         ),
     ]
-    # A file of finished batches, from which the same sweep resumes; a command has its own.
+    # A file of finished batches, from which the same sweep resumes; a command has its
+    # own.
     partial: Path | None = field(default=None, kw_only=True, compare=False)
 
     name: ClassVar[str] = "sweep"
@@ -51,7 +53,7 @@ class Sweep(Question):
         _ = self.plan.grid  # refuses points that make no scene
 
     def check_draw(self) -> None:
-        if len(self.over) > DRAWN:
+        if len(self.over) > LARGEST_DRAWN:
             raise Refusal(
                 f"cannot draw {len(self.over)} parameters",
                 instead="sweep one or two, or leave ``plot`` out",

@@ -107,8 +107,8 @@ def limit_pair(text: str) -> tuple[float, float]:
 
 
 def no_degrees_of_amplitude(scene: Any) -> str | None:
-    """Return why degrees are refused for an amplitude of the scene's gait; None if it is
-    an angle."""
+    """Return why degrees are refused for an amplitude of the scene's gait; None if it
+    is an angle."""
     if is_angle(scene.gait, "amplitude"):
         return None
     return f"the amplitude of a {type(scene.gait).__name__.lower()} is none"
@@ -293,8 +293,8 @@ def is_limit(text: str, in_percent: bool) -> bool:
 
 
 def measurements(path: Path | None, scene: Any, panels: Sequence[str]) -> Any:
-    """Return what `geomech.scenes.measurements` reads of the quantity of one panel, x if
-    none is named; None without a file."""
+    """Return what `geomech.scenes.measurements` reads of the quantity of one panel, x
+    if none is named; None without a file."""
     from geomech.scenes.measurements import read
 
     if path is None:

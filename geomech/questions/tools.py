@@ -1,4 +1,4 @@
-"""What several questions make their results with."""
+"""Functions that several questions share."""
 
 import warnings
 from collections.abc import Iterable, Mapping
@@ -38,8 +38,8 @@ def words(names: Any) -> Any:
 
 
 def command_line(question: base.Question) -> str:
-    """Return the command that asks a question, without its output and without options on
-    which its answer does not depend."""
+    """Return the command that asks a question, without its output and without options
+    on which its answer does not depend."""
     compared = [one.name for one in fields(question) if one.compare]
     words = ["geomech", question.name.replace("_", "-")]
     if question.subject is not None:
@@ -69,8 +69,8 @@ def component() -> Variable:
 
 
 def seconds(took: Mapping[str, float], kept: Iterable[str]) -> list[Variable]:
-    """Return the seconds that parts of a computation took, and whether they were computed
-    before."""
+    """Return the seconds that parts of a computation took, and whether they were
+    computed before."""
     before = [int(part in kept) for part in took]
     return [
         Variable("part", ("part",), np.array([*took], dtype="U")),
@@ -93,7 +93,8 @@ def warn_of_notes(result: Result) -> None:
 
 
 def side_by_side(result: Result, name: str, dim: str, names: Iterable[str]) -> Variable:
-    """Return variables without dimensions as one, over a dimension, with their errors."""
+    """Return variables without dimensions as one, over a dimension, with their
+    errors."""
     parts = [result[each] for each in names]
     values = [float(part) for part in parts]
     errors = [float(part.error) for part in parts]

@@ -1,5 +1,5 @@
-"""The motion of a body through its gait: pose, shape and ends of the links at every phase;
-as a film or a strip of pictures, too."""
+"""The motion of a body through its gait: pose, shape and ends of the links at every
+phase; as a film or a strip of pictures, too."""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 POSE = ("x", "y", "heading")
 FINAL = ("final_x", "final_y", "final_heading")
-OF_FILM = 3  # cycles, where nobody says how many
-WITHOUT_MAP = (".csv", ".txt")  # files that nobody draws from
+CYCLES_OF_FILM = 3  # by default
+WITHOUT_MAP = (".csv", ".txt")  # files from which nothing is drawn
 
 
 def write_film(path: Path, result: Result) -> None:
@@ -30,8 +30,8 @@ def write_film(path: Path, result: Result) -> None:
 @dataclass(frozen=True)
 class Trajectory(Question):
     """Follow the body through its gait. A table has pose, joint angles and ends of all
-    links at every phase. A film (-o FILE.gif) or a strip of pictures for a page (--plot)
-    shows the body on its track beside its shape on the CCF."""
+    links at every phase. A film (-o FILE.gif) or a strip of pictures for a page
+    (--plot) shows the body on its track beside its shape on the CCF."""
 
     scene: Annotated["Scene", Subject(loading.load_scene, names.scene_names)]
     cycles: Annotated[
@@ -59,10 +59,11 @@ class Trajectory(Question):
 
     def for_files(self, paths: list[Path], options: dict[str, Any]) -> Question:
         check_films(paths)
-        drawn = [p for p in paths if p.suffix.lower() not in WITHOUT_MAP]
-        filmed, cycles = any(map(is_film, paths)), self.cycles
+        drawn = [path for path in paths if path.suffix.lower() not in WITHOUT_MAP]
+        filmed = any(map(is_film, paths))
+        cycles = self.cycles
         if filmed and cycles is None:
-            cycles = OF_FILM
+            cycles = CYCLES_OF_FILM
         return replace(self, cycles=cycles, mapped=bool(drawn), filmed=filmed)
 
     def for_picture(self, **options: Any) -> Question:

@@ -1,5 +1,5 @@
-"""How a robot walks on grains: its motion from rest, and the means of its limit cycle with
-their errors."""
+"""How a robot walks on grains: its motion from rest, and the means of its limit cycle
+with their errors."""
 
 import math
 from dataclasses import dataclass
@@ -38,8 +38,8 @@ def write_film(
 
 @dataclass(frozen=True)
 class Walk(Question):
-    """Compute how a robot walks on grains. The mean speed has an error; the motion begins
-    at rest. SI units, pitch in rad, nose down."""
+    """Compute how a robot walks on grains. The mean speed has an error; the motion
+    begins at rest. SI units, pitch in rad, nose down."""
 
     scene: Annotated["WalkerScene", Subject(loading.load_walker, names.walker_names)]
     engine: Annotated[
@@ -66,7 +66,9 @@ class Walk(Question):
     def compute(self, run: Run) -> Result:
         from geomech.studies import walking
 
-        longest = LONGEST if run.limited else math.inf
+        longest = math.inf
+        if run.limited:
+            longest = LONGEST
         found = walking.run(self.scene, self.engine, run.progress, longest)
         return Result("walk", tuple(walking.variables(self.scene, found)))
 
@@ -76,13 +78,14 @@ class Walk(Question):
 
     @staticmethod
     def headline(result: Result) -> list[str]:
-        name, status = result.attributes["scene"], str(result["status"].values)
+        name = result.attributes["scene"]
+        status = str(result["status"].values)
         speed = scalar(result["speed"])
-        regular = "no limit cycle found: mean of what there is"
+        cycle = "no limit cycle found: mean of what there is"
         if result["periodic"].values:
-            regular = f"limit cycle{settling_words(result)}"
+            cycle = f"limit cycle{settling_words(result)}"
         frequency = float(result["frequency"])
-        return [f"{name}: {status} at {speed} at {frequency:g} Hz ({regular})"]
+        return [f"{name}: {status} at {speed} at {frequency:g} Hz ({cycle})"]
 
     @staticmethod
     def summary(result: Result) -> Result:
@@ -107,10 +110,10 @@ class Walk(Question):
         unsolved = int(result["unsolved"].values)
         if unsolved:
             residual = float(result["residual"])
-            moved = float(result["speed_error_of_unsolved"])
+            speed_error = float(result["speed_error_of_unsolved"])
             lines.append(
-                f"{unsolved} steps were taken unsolved, off by up to {residual:.1g} m/s, "
-                f"which moves the speed by {moved:.1g} m/s: "
+                f"{unsolved} steps were taken unsolved, off by up to {residual:.1g} "
+                f"m/s, which moves the speed by {speed_error:.1g} m/s: "
                 "raise [numerics] steps or rounding"
             )
         return lines
@@ -136,7 +139,8 @@ def settling_words(result: Result) -> str:
 
     if "settling_time" not in result:
         return ""
-    time, within = float(result["settling_time"]), f"within {100 * NEAR:g} % of it"
+    time = float(result["settling_time"])
+    within = f"within {100 * NEAR:g} % of it"
     if math.isinf(time):
         return f"; from rest it does not come {within}"
     if time == 0:

@@ -30,8 +30,8 @@ def series_of(result: Result) -> TaylorSeries:
 
 
 def fitted_gait(result: Result) -> Fourier:
-    """Return the mean gait of a log, from a result of `fit_gait`: of amplitude 1, with the
-    log's frequency if its t is a time.
+    """Return the mean gait of a log, from a result of `fit_gait`: of amplitude 1, with
+    the log's frequency if its t is a time.
 
     Examples
     --------

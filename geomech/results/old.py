@@ -78,8 +78,8 @@ def of_quantity(name: str, values: np.ndarray, error: Variable) -> Variable:
 
 
 def of_walks(by_name: dict[str, Variable]) -> list[Variable]:
-    """Return speeds of robots with their errors, and all else; a status that is a number
-    as the word that its label has for it."""
+    """Return speeds of robots with their errors, and all else; a status that is a
+    number as the word that its label has for it."""
     for name, error in ERRORS.items():
         if name in by_name and error in by_name:
             values = by_name.pop(error).values

@@ -1,5 +1,5 @@
-"""The result of a trial of midlines: quantities with intervals, along the body, by cycle, and
-as predicted."""
+"""The result of a trial of midlines: quantities with intervals, along the body, by
+cycle, and as predicted."""
 
 from __future__ import annotations
 
@@ -133,7 +133,8 @@ def _starts(fit: Kinematics) -> np.ndarray:
 
 
 def _mean_cycle(fit: Kinematics) -> list[Variable]:
-    """Return the mean cycle: headings along the body, less their mean over the cycle."""
+    """Return the mean cycle: headings along the body, less their mean over the
+    cycle."""
     headings = fit.cycles(fit.curve).headings
     each = headings - headings.mean((1, 2), keepdims=True)
     error = None
@@ -176,8 +177,8 @@ def _scale(fit: Kinematics) -> tuple[str, float]:
 def _compared(
     fit: Kinematics, c: Comparison, units: dict[str, str], label: str
 ) -> list[Variable]:
-    """Return what is predicted: quantities, how far they are from the measured ones, those
-    of each cycle, and the way."""
+    """Return what is predicted: quantities, how far they are from the measured ones,
+    those of each cycle, and the way."""
     variables = []
     for k, name in enumerate(COMPARED):
         words = f"{LABELS[name]}, predicted"
@@ -207,8 +208,8 @@ def _compared(
 
 
 def _predicted_track(fit: Kinematics, c: Comparison) -> np.ndarray:
-    """Return where the body is when cycles begin, and at the end of the last, as predicted
-    (C + 1,), x + i y, from where it was at the start."""
+    """Return where the body is when cycles begin, and at the end of the last, as
+    predicted (C + 1,), x + i y, from where it was at the start."""
     cycles, (_, size) = fit.cycles(fit.curve), _scale(fit)
     values = dict(zip(COMPARED, c.predicted))
     count, length = len(cycles.duration), fit.value("body_length")[0]
