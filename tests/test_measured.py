@@ -22,7 +22,7 @@ import rft
 from figures import measured_gait
 from geomech import gaits, measured
 from geomech.core.errors import Note, UnitWarning
-from geomech.describe.explain import explained
+from geomech.describe.scene import description
 from geomech.geometry import connection
 from geomech.geometry.connection import Connection
 from geomech.geometry.curvature import ccf
@@ -877,7 +877,7 @@ def test_what_the_data_do_not_reach_is_refused(field):
     tube = study.fitted
     shapes = np.stack(np.meshgrid(*tube.axes, indexing="ij"), -1)
     np.testing.assert_array_equal(np.isnan(tube.A[0, 0]), tube.reach(shapes) > 1)
-    assert "known near a measured gait alone" in explained(scene)
+    assert "known near a measured gait alone" in description(scene)
 
 
 def test_the_reach_is_that_of_the_data(usual):
