@@ -1,4 +1,5 @@
-"""The command line: the commands of `geomech.questions`, and those that ask none."""
+"""The command line: the commands of `geomech.questions`, and those that ask no
+question."""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ class Commands(Mapping[str, Any]):
     use."""
 
     def __iter__(self) -> Iterator[str]:
-        return (typed(name) for names in headings().values() for name in names)
+        for names in headings().values():
+            yield from map(command_word, names)
 
     def __len__(self) -> int:
         return sum(map(len, headings().values()))
@@ -29,7 +31,7 @@ class Commands(Mapping[str, Any]):
     def __getitem__(self, name: str) -> Any:
         if name not in iter(self):
             raise KeyError(name)
-        return loaded(name.replace("-", "_"))
+        return load_command(name.replace("-", "_"))
 
 
 class Group(TyperGroup):
@@ -43,9 +45,9 @@ class Group(TyperGroup):
         return [*self.commands]
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        wide = max(map(len, self.list_commands(ctx)))
+        width = max(map(len, self.list_commands(ctx)))
         for heading, names in headings().items():
-            rows = [(typed(name).ljust(wide), summary(name)) for name in names]
+            rows = [(command_word(name).ljust(width), summary(name)) for name in names]
             with formatter.section(heading):
                 formatter.write_dl(rows)
 
@@ -62,7 +64,7 @@ def headings() -> dict[str, list[str]]:
     return found
 
 
-def typed(name: str) -> str:
+def command_word(name: str) -> str:
     """Return the name of a command as it is typed."""
     return name.replace("_", "-")
 
@@ -75,12 +77,12 @@ def summary(name: str) -> str:
 
 
 @functools.cache
-def loaded(name: str) -> Any:
-    """Return a command: that of its question, or one of those that ask none."""
+def load_command(name: str) -> Any:
+    """Return a command by its name: of a question, or one that asks none."""
     single = typer.Typer(
         pretty_exceptions_enable=False, rich_markup_mode=None, add_completion=False
     )
-    single.command(typed(name))(with_plugins(function(name)))
+    single.command(command_word(name))(with_plugins(function(name)))
     return typer.main.get_command(single)
 
 

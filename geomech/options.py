@@ -26,7 +26,7 @@ YesOption = Annotated[
 # Changes of a scene
 
 
-def an_angle(text: str | float) -> float:
+def parse_angle(text: str | float) -> float:
     """Return an option that is an angle, 2.5 or 120deg, in rad."""
     try:
         return texts.number(str(text), None)
@@ -50,7 +50,7 @@ ExtentOption = Annotated[
         "--extent",
         metavar="ANGLE",
         help="half width of the grid in rad, or as 120deg",
-        parser=an_angle,
+        parser=parse_angle,
     ),
 ]
 MediumOption = Annotated[
@@ -73,7 +73,7 @@ PluginOption = Annotated[
         help="Python file with parts of your own, such as laws",
     ),
 ]
-ABOUT = {"name", "subject"}  # first arguments of commands that take plug-ins
+SUBJECTS = {"name", "subject"}  # first arguments of commands that take plug-ins
 
 
 def load_plugins(files: list[Path] | None) -> None:
@@ -87,8 +87,8 @@ def load_plugins(files: list[Path] | None) -> None:
 def with_plugins(command: Callable) -> Callable:
     """Return a command that also takes ``--plugin`` if it is about a scene; any other
     as it is."""
-    taken = {*inspect.signature(command).parameters}
-    if not ABOUT & taken or "plugin" in taken:
+    names = {*inspect.signature(command).parameters}
+    if not SUBJECTS & names or "plugin" in names:
         return command
 
     def run(plugin: list[Path] | None = None, **arguments: Any) -> Any:

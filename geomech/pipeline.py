@@ -70,7 +70,7 @@ def execute(
 
 
 def notes_of(result: Result) -> list[str]:
-    """Return what a result says besides its numbers."""
+    """Return the notes of a result, which a command prints on standard error."""
     if "note" not in result:
         return []
     return result["note"].values.tolist()
@@ -124,7 +124,7 @@ def computing(
 
 
 def takes_time(question: Question) -> bool:
-    """Return whether progress is shown: of questions about measurements and media it is
+    """Return whether progress is shown; of questions about measurements and media it is
     not."""
     return hasattr(question, "scene") or question.subject is None
 
@@ -147,7 +147,7 @@ def allow(question: Question, cost: Cost, yes: bool) -> None:
 
 
 def note_system(question: Question) -> None:
-    """Warn of what is likely not meant, once a command. An intruder scene has no
+    """Warn of what is likely not meant, once per command. An intruder scene has no
     system."""
     from geomech.describe.system import notes
 
@@ -205,7 +205,7 @@ class _Unused(Exception):
 
 @contextlib.contextmanager
 def place(output: Output, inputs: list[Path]) -> Iterator[Path]:
-    """Yield the path to write to: a folder is filled elsewhere, and appears whole or
+    """Yield the path to write to: a folder is filled elsewhere, and appears complete or
     not at all."""
     if not output.folder:
         yield output.path

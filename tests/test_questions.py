@@ -142,7 +142,7 @@ def test_a_declaration_is_a_command_a_schema_and_a_reference(asked):
     declared = declaration(type(asked))
     taken = [p.name for p in parameters(declared)]
     assert len(taken) == len({*taken})
-    every = {**declared.fields, **declared.picture, **declared.of_files}
+    every = {**declared.fields, **declared.picture, **declared.all_files}
     assert {*every} <= {*taken}
     assert all(option.help for option, _, _ in every.values())
     line = questions.SUMMARIES[asked.name]
@@ -424,7 +424,7 @@ def added(monkeypatch):
     monkeypatch.setitem(questions.GROUPS["Analyse"], name, words)
     monkeypatch.setitem(questions.SUMMARIES, name, words)
     yield module.Loop
-    cli.loaded.cache_clear()
+    cli.load_command.cache_clear()
 
 
 def test_the_question_of_the_page_is_a_command(added, tmp_path):

@@ -19,6 +19,8 @@ import numpy as np
 from geomech.core.face import implementation
 
 Unit = str | tuple[str, ...]
+COMPONENTS = ("x", "y", "theta")  # of a velocity in the body frame
+POSE = ("x", "y", "heading")  # of a displacement
 ARRAYS = ("values", "error", "spread")  # of a variable, all of one shape
 
 

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from geomech import terminal
+from geomech.core.variables import COMPONENTS
 from geomech.options import SceneArgument
 from geomech.questions.loading import load_scene
 from rft.core.refusal import located
 
 if TYPE_CHECKING:
     from geomech.scenes import Scene
-
-ROWS = ("x", "y", "theta")
 
 
 def symbolic(
@@ -59,7 +58,7 @@ def formulas(scene: Scene, ccf: bool = True, latex: bool = False) -> Iterator[st
 def entries(matrix: Any, name: str) -> str:
     """Return a line for each entry of a matrix; those of A by component and joint."""
     lines = []
-    for r, row in enumerate(ROWS):
+    for r, row in enumerate(COMPONENTS):
         for k in range(matrix.shape[1]):
             entry = f"{name}_{row}"
             if name == "A":

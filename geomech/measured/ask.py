@@ -12,7 +12,7 @@ from geomech.measured.midlines import reader
 from geomech.measured.midlines.trial import Trial
 from rft.core.refusal import Refusal, formatted, line
 
-OF_LOGS = "degrees", "harmonics", "limits", "scene"
+OF_LOGS = ("degrees", "harmonics", "limits", "scene")
 OF_MIDLINES = (
     "medium",
     "effects",
@@ -29,7 +29,8 @@ WHAT = (
     "give a CSV file with a header such as t,alpha_1,alpha_2,x,y,heading for joint "
     "angles, or t,point,x,y or t,x1,y1,x2,y2 for points along a body"
 )
-LOG, MIDLINES = "log", "midlines"
+LOG = "log"
+MIDLINES = "midlines"
 WORDS = {LOG: "a log of joint angles", MIDLINES: "midlines"}
 SCENE = (
     "give one cycle of the midlines to a scene whose [gait] has kind = 'centreline' "

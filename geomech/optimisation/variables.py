@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from geomech.core.variables import Variable
+from geomech.core.variables import POSE, Variable
 from geomech.geometry.symmetry import zero_components
 from geomech.optimisation.limiting import PHASES, limiting
 from geomech.optimisation.optimum import Optimum
@@ -82,9 +82,7 @@ def displacement(optimum: Optimum) -> list[Variable]:
     length = length_unit(system)
     reasons = zero_components(system.traits, optimum.gait)
     found = []
-    for name, value, unit in zip(
-        ("x", "y", "heading"), best.displacement, (length, length, "rad")
-    ):
+    for name, value, unit in zip(POSE, best.displacement, (length, length, "rad")):
         zero = ""
         if name in reasons:
             zero = zero_words(reasons[name])

@@ -64,12 +64,12 @@ class Subject:
 
 
 def ignore(_: Any) -> None:
-    """Take no notice of progress or of cost."""
+    """Ignore progress, or a cost."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """What a computation is given besides its question.
+    """The surroundings of a computation.
 
     progress: called with the fraction done. allow: called with a cost that was not
     known beforehand; raises where it is too much. limited: whether limits of cost hold,
@@ -83,7 +83,7 @@ class Run:
 
     @property
     def shown_progress(self) -> Progress | None:
-        """The progress that is shown; None where what computes shows its own."""
+        """The progress that is shown; None where the computation shows its own."""
         if self.progress is ignore:
             return None
         return self.progress
@@ -217,7 +217,7 @@ def subject_field(question: type[Question]) -> tuple[str, Subject | None]:
     """Return the name of the field that a question is about, and what it is; "" and
     None of a question that consists of options alone."""
     for field in dataclasses.fields(question):
-        subject = marked(field.type, Subject)
+        subject = mark_of(field.type, Subject)
         if subject is not None:
             return field.name, subject
     return "", None
@@ -227,7 +227,7 @@ def options(question: type[Question]) -> Declared:
     """Return the options of a question by field."""
     found = {}
     for field in dataclasses.fields(question):
-        option = marked(field.type, Option)
+        option = mark_of(field.type, Option)
         if option is not None:
             found[field.name] = (option, plain_type(field.type), field.default)
     return found
@@ -240,15 +240,15 @@ def keyword_options(function: Callable | None) -> Declared:
     if function is None:
         return found
     for parameter in inspect.signature(function).parameters.values():
-        option = marked(parameter.annotation, Option)
+        option = mark_of(parameter.annotation, Option)
         if option is not None:
             kind = plain_type(parameter.annotation)
             found[parameter.name] = (option, kind, parameter.default)
     return found
 
 
-def marked(annotation: Any, kind: type) -> Any:
-    """Return what an annotation has of a kind; None without one."""
+def mark_of(annotation: Any, kind: type) -> Any:
+    """Return the mark of an annotation that is of a class; None without one."""
     for mark in getattr(annotation, "__metadata__", ()):
         if isinstance(mark, kind):
             return mark
@@ -260,8 +260,8 @@ def plain_type(annotation: Any) -> Any:
     return get_args(annotation)[0]
 
 
-def of_union(kind: Any) -> Any:
-    """Return the type of a value that may be left out, without None."""
+def without_none(kind: Any) -> Any:
+    """Return the type of an optional value, without None."""
     if get_origin(kind) in (Union, UnionType):
         return next(part for part in get_args(kind) if part is not type(None))
     return kind
@@ -309,7 +309,7 @@ def schema(question: type[Question]) -> dict[str, Any]:
 
 def json_type(kind: Any) -> dict[str, Any]:
     """Return the JSON Schema of a type; {} for any value."""
-    kind = of_union(kind)
+    kind = without_none(kind)
     named = JSON_TYPES.get(get_origin(kind) or kind)
     if named is None:
         return {}

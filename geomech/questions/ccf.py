@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from geomech.core.errors import choose
-from geomech.core.variables import Result
+from geomech.core.variables import POSE, Result
 from geomech.questions import loading, names, parsing, tools
 from geomech.questions.base import Option, Question, Run, Subject
 from geomech.questions.common import ColourLimit, OtherFrame, Pair, Panels, Slice
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from geomech.studies.shape_space import Plan
 
 SIGN = "positive for counter-clockwise loops"
-POSE = ("x", "y", "heading")
 
 
 @dataclass(frozen=True)

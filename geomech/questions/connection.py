@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 
 from geomech.core.errors import choose
-from geomech.core.variables import Result, Variable
+from geomech.core.summary import percent
+from geomech.core.variables import COMPONENTS, Result, Variable
 from geomech.io.files import note
 from geomech.questions import loading, names, parsing, tools
 from geomech.questions.base import Option, Question, Run, Subject
@@ -338,7 +339,7 @@ def facts_of(tables: "SceneTables") -> dict[str, Any]:
 def direction_words(shares: Any) -> list[str]:
     """Return by how much more directions of alphadot change A."""
     rows = []
-    for name, share in zip(["x", "y", "theta"], shares):
+    for name, share in zip(COMPONENTS, shares):
         if np.isfinite(share):
             rows.append(f"{name} {100 * share:.2g} %")
     if not rows:
@@ -354,11 +355,8 @@ def fit_words(result: Result) -> str:
     if "fit_share" not in result or np.isnan(result["fit_share"].values).all():
         return "fit residual unknown"
     parts = []
-    for name, share in zip(["x", "y", "theta"], result["fit_share"].values):
-        percent = "0 %"
-        if share > 1e-8:
-            percent = f"{100 * share:.2g} %"
-        parts.append(f"{name} {percent}")
+    for name, share in zip(COMPONENTS, result["fit_share"].values):
+        parts.append(f"{name} {percent(share)}")
     words = f"leaves {', '.join(parts)} of the rms of xi"
     singular = int(result["singular_shapes"].values)
     if singular:

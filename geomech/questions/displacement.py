@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, cast
 
 import numpy as np
 
-from geomech.core.variables import Result, Variable
+from geomech.core.variables import POSE, Result, Variable
 from geomech.questions import loading, names, parsing, tools
 from geomech.questions.base import Option, Question, Run, Subject
 from geomech.questions.common import CurvePanels
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from geomech.gaits import Gait
     from geomech.scenes.model import Scene
 
-POSE = ("x", "y", "heading")
 EFFORT = ("path_length", "work", "cost_of_transport")
 LARGEST_COMPARED = 4  # amplitudes up to which the other tiers' x is shown
 FRAME = "x ahead, y to the left, as the body frame points at the start of the cycle"

@@ -161,10 +161,10 @@ class FitGait(Question):
         if self.body_length is not None:
             in_range("``body_length``", self.body_length, 1e-9, 1e9)
         _ = self.form  # refuses options of the other
-        _ = self.known_medium
+        _ = self.loaded_medium
 
     @cached_property
-    def known_medium(self) -> Any:
+    def loaded_medium(self) -> Any:
         """The medium of a prediction; None without one."""
         from geomech.scenes.read import medium_of
 
@@ -198,9 +198,9 @@ class FitGait(Question):
         midlines: Any = self.file
         given = {name: getattr(self, name) for name in names}
         fit = fit_midlines(midlines, **given)
-        if self.known_medium is None:
+        if self.loaded_medium is None:
             return of_trial(fit)
-        return of_trial(fit, compare(fit, self.known_medium, tuple(self.effects)))
+        return of_trial(fit, compare(fit, self.loaded_medium, tuple(self.effects)))
 
     def answer(self, run: Run) -> Result:
         # Measurements have a name, and are no scene.

@@ -2,10 +2,9 @@
 
 from dataclasses import replace
 
-from geomech.core.variables import Result, Variable
+from geomech.core.variables import POSE, Result, Variable
 from geomech.questions import tools
 
-POSE = ("x", "y", "heading")
 QUALITY = ("difference", "scatter")  # by component
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from geomech.core.errors import Note, choose
-from geomech.core.variables import Result, Variable, same_or_each
+from geomech.core.variables import COMPONENTS, Result, Variable, same_or_each
 from geomech.questions import base
 from rft.core.checks import is_number
 from rft.core.refusal import in_line
@@ -65,7 +65,7 @@ def option_text(value: Any) -> str:
 
 def component() -> Variable:
     """Return the coordinate of x, y and theta."""
-    return Variable("component", ("component",), ["x", "y", "theta"])
+    return Variable("component", ("component",), COMPONENTS)
 
 
 def seconds(took: Mapping[str, float], kept: Iterable[str]) -> list[Variable]:
@@ -111,11 +111,10 @@ def in_degrees(variable: Variable) -> Variable:
 
 def component_number(components: Any) -> int:
     """Return the number of one component, x, y or theta; x if none is named."""
-    known = ("x", "y", "theta")
     if isinstance(components, str):
         components = (components,)
     names = [*components] or ["x"]
-    return known.index(choose("component", names[0], known))
+    return COMPONENTS.index(choose("component", names[0], COMPONENTS))
 
 
 def is_film(path: Path) -> bool:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from geomech.core.variables import Result
+from geomech.core.variables import POSE, Result
 from geomech.questions import loading, names
 from geomech.questions.base import Option, Question, Run, Subject
 from geomech.questions.tools import FILMS, check_films, is_film
@@ -14,7 +14,6 @@ from geomech.run.cost import Cost
 if TYPE_CHECKING:
     from geomech.scenes.model import Scene
 
-POSE = ("x", "y", "heading")
 FINAL = ("final_x", "final_y", "final_heading")
 CYCLES_OF_FILM = 3  # by default
 WITHOUT_MAP = (".csv", ".txt")  # files from which nothing is drawn

@@ -35,7 +35,8 @@ def magnitude(number: float) -> int:
 
 
 def number(value: float, places: int | None = None, digits: int = PLAIN) -> str:
-    """Return a number with so many decimal places, or in its shortest form."""
+    """Return a number with ``places`` decimal places, or with ``digits`` digits in its
+    shortest form; "-" for nan."""
     if not math.isfinite(value):
         return "-"
     if places is None or value == 0:

@@ -124,7 +124,9 @@ def register_plugins(payload: TaskPayload) -> None:
 def perform(payload: TaskPayload, item: bytes) -> bytes:
     """Return the `Outcome` of a task, pickled; errors are raised where the command
     runs."""
-    value, error, where = None, None, ""
+    value = None
+    error = None
+    where = ""
     with _record_warnings() as caught:
         try:
             task, common = load_task(payload)
