@@ -433,7 +433,7 @@ class _Search:
         not those of the search, their error."""
         request = self.request
         if request.by_runs or request.system is not request.scene.system:
-            return NO_TURN + evaluation.heading
+            return NO_TURN + evaluation.displacement_error[2]
         return NO_TURN
 
     def _report(self, cycles: int = 1) -> None:

@@ -75,19 +75,22 @@ def values(optimum: Optimum) -> list[Variable]:
 
 
 def displacement(optimum: Optimum) -> list[Variable]:
-    """Return the pose after a cycle, path length and work where they are known, and the
-    frequency of a gait that is timed."""
+    """Return the pose after a cycle with its errors, path length and work where they
+    are known, and the frequency of a gait that is timed."""
     system = optimum.scene.system
     best = optimum.best
     length = length_unit(system)
     reasons = zero_components(system.traits, optimum.gait)
+    pose_units = (length, length, "rad")
     found = []
-    for name, value, unit in zip(POSE, best.displacement, (length, length, "rad")):
+    for name, value, error, unit in zip(
+        POSE, best.displacement, best.displacement_error, pose_units
+    ):
         zero = ""
         if name in reasons:
             zero = zero_words(reasons[name])
         label = "net displacement per cycle"
-        found.append(Variable(name, (), value, unit, label, zero=zero))
+        found.append(Variable(name, (), value, unit, label, error, zero=zero))
 
     effort_units = units(system)
     for name, value in (("path_length", best.length), ("work", best.work)):
