@@ -29,7 +29,7 @@ YesOption = Annotated[
 def parse_angle(text: str | float) -> float:
     """Return an option that is an angle, 2.5 or 120deg, in rad."""
     try:
-        return texts.number(str(text), None)
+        return texts.parse_number(str(text), None)
     except ValueError:
         raise typer.BadParameter(
             f"{text!r} is no angle: give one such as 2.5 (rad) or 120deg"

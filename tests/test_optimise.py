@@ -583,7 +583,7 @@ def test_three_joints_and_gaits_that_must_be_run_as_a_whole():
         Numerics(phases=64),
     )
     assert build_request(past, "efficiency").degree == 1.0
-    assert build_request(past, "displacement").by_runs
+    assert build_request(past, "displacement").uses_runs
 
 
 def test_a_gait_drawn_together_is_kept_clear_of_singular_shapes(monkeypatch):
@@ -1629,7 +1629,7 @@ def test_a_turn_may_be_off_by_its_error_where_cycles_are_not_those_of_the_search
 
     past = viscous(system=Swimmer(SAND, Chain(), (Transient(travel=0.1),)))
     framed = SceneTables(viscous()).in_frame("minimum-perturbation").scene
-    evaluation = types.SimpleNamespace(heading=0.3)
+    evaluation = types.SimpleNamespace(displacement_error=[0.0, 0.0, 0.3])
     slacks = [
         searching(build_request(scene, "displacement"))._slack(evaluation)
         for scene in (viscous(), past, framed)

@@ -43,7 +43,7 @@ def _sum(fit: Fitted, factors: np.ndarray) -> str:
     return " + ".join(terms).replace("+ -", "- ")
 
 
-def of_fit(fit: Fitted, mapped: bool = True) -> Result:
+def fit_result(fit: Fitted, mapped: bool = True) -> Result:
     """Return all numbers of a measured gait. mapped: with A and its error on a grid,
     and the CCF of two joints, nan where there are no data.
 
@@ -53,7 +53,7 @@ def of_fit(fit: Fitted, mapped: bool = True) -> Result:
         *_quality(fit),
         *_along(fit),
         *_cycles(fit),
-        *fields.of_known(fit.known, fit.unit),
+        *fields.of_known(fit.taylor, fit.unit),
     ]
     lead = [
         Variable("component", ("component",), np.array(COMPONENTS)),
@@ -79,7 +79,7 @@ def _displacements(fit: Fitted) -> list[Variable]:
     """Return the displacement of a cycle, as logged and of the mean gait."""
     net, error = fit.displacement
     mean, mean_error = fit.mean
-    interval = f"half width of the interval of {fit.known.level:.3g} of cases"
+    interval = f"half width of the interval of {fit.taylor.level:.3g} of cases"
     found = []
     for ending, label, values, errors in (
         ("", "per cycle, mean of the log", mean, mean_error),
@@ -109,7 +109,7 @@ def _quality(fit: Fitted) -> list[Variable]:
             "rms of the phase about a uniform run through each cycle",
         ),
         Variable(
-            "harmonics", (), fit.known.A.shape[-1] // 2, "1", "of A in the phase"
+            "harmonics", (), fit.taylor.A.shape[-1] // 2, "1", "of A in the phase"
         ),
         Variable(
             "difference", over, difference, _units(fit),
@@ -155,7 +155,7 @@ def _along(fit: Fitted) -> list[Variable]:
 def _reach(fit: Fitted) -> np.ndarray:
     """Return the half width of the data across the gait, rad, in the direction in which
     it is least, at PRINTED_PHASES."""
-    spread = fit.known.spread
+    spread = fit.taylor.spread
     least = np.sqrt(np.linalg.eigvalsh(np.moveaxis(spread, -1, 0))[:, 0])
     return least[np.arange(PRINTED_PHASES) * spread.shape[-1] // PRINTED_PHASES]
 
@@ -211,8 +211,8 @@ def _about(fit: Fitted) -> dict[str, Any]:
         "sign_of_ccf": "CCF = dA + [A, A] with [X, Y] = XY - YX, positive for "
         "counter-clockwise loops",
         "pair_of_ccf": "CCF_12 = dA_2 / dalpha_1 - dA_1 / dalpha_2 + [A_1, A_2]",
-        "level": float(fit.known.level),
-        "error_factor": float(fit.known.factor),
+        "level": float(fit.taylor.level),
+        "error_factor": float(fit.taylor.factor),
         "cycles": len(fit.measured),
         "rows": len(fit.log.t),
         "columns": ", ".join(fit.log.joints),

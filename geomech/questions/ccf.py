@@ -44,7 +44,7 @@ class Ccf(Question):
 
     def __post_init__(self) -> None:
         if self.slice is not None:
-            self._set(slice=tools.numbers(self.slice))
+            self._set(slice=tools.as_numbers(self.slice))
 
     @property
     def sliced(self) -> bool:

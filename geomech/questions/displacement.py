@@ -66,8 +66,8 @@ class Displacement(Question):
             amplitudes = getattr(self.gait or self.scene.gait, "amplitude", 1.0)
         tiers = self.tiers
         if tiers is not None:
-            tiers = tools.words(tiers)
-        self._set(amplitudes=tools.numbers(amplitudes), tiers=tiers)
+            tiers = tools.as_words(tiers)
+        self._set(amplitudes=tools.as_numbers(amplitudes), tiers=tiers)
 
     @property
     def values(self) -> Sequence[float]:

@@ -116,7 +116,7 @@ class FitGait(Question):
     table: ClassVar[tuple[str, ...]] = ("cycle",)
 
     def __post_init__(self) -> None:
-        self._set(columns=tools.words(self.columns), effects=tuple(self.effects))
+        self._set(columns=tools.as_words(self.columns), effects=tuple(self.effects))
 
     @property
     def path(self) -> Path | None:
@@ -179,17 +179,17 @@ class FitGait(Question):
 
     def _of_log(self) -> Result:
         from geomech.measured.fit import fit_log
-        from geomech.measured.results import of_fit
+        from geomech.measured.results import fit_result
 
         names = ("columns", "degrees", "level", "harmonics", "limits", "body_length")
         log: Any = self.file
         given = {name: getattr(self, name) for name in names}
-        return of_fit(fit_log(log, **given), self.mapped)
+        return fit_result(fit_log(log, **given), self.mapped)
 
     def _of_midlines(self) -> Result:
         from geomech.measured.midlines.fit import fit_midlines
         from geomech.measured.midlines.predicted import compare
-        from geomech.measured.midlines.results import of_trial
+        from geomech.measured.midlines.results import trial_result
 
         names = (
             "columns", "units", "scale", "fps", "y", "head", "least_score",
@@ -199,8 +199,8 @@ class FitGait(Question):
         given = {name: getattr(self, name) for name in names}
         fit = fit_midlines(midlines, **given)
         if self.loaded_medium is None:
-            return of_trial(fit)
-        return of_trial(fit, compare(fit, self.loaded_medium, tuple(self.effects)))
+            return trial_result(fit)
+        return trial_result(fit, compare(fit, self.loaded_medium, tuple(self.effects)))
 
     def answer(self, run: Run) -> Result:
         # Measurements have a name, and are no scene.

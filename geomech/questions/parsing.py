@@ -35,7 +35,7 @@ def angles(text: str, scene: Any, flag: str) -> tuple[float, ...] | None:
 
 def angle(text: str, subject: Any, flag: str) -> float:
     """Return the angle 0.3 or 20deg, rad."""
-    return texts.numbers(flag, text, 1, None)[0]
+    return texts.parse_numbers(flag, text, 1, None)[0]
 
 
 def joint_limits(text: str, scene: Any, flag: str) -> Any:

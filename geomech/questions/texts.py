@@ -25,7 +25,7 @@ class NoAngle(Exception):
     """Degrees were given where they are refused; its text says why."""
 
 
-def number(text: str, no_degrees: str | None) -> float:
+def parse_number(text: str, no_degrees: str | None) -> float:
     """Return 0.5, or 30deg for an angle, in rad.
 
     no_degrees: why degrees are refused; None for an angle."""
@@ -36,7 +36,7 @@ def number(text: str, no_degrees: str | None) -> float:
     return math.radians(float(text.strip().removesuffix("deg")))
 
 
-def numbers(
+def parse_numbers(
     option: str,
     text: str,
     count: int | None = None,
@@ -46,7 +46,7 @@ def numbers(
 
     no_degrees: why degrees are refused; None for angles, which may be 30deg."""
     try:
-        values = [number(part, no_degrees) for part in text.split(",")]
+        values = [parse_number(part, no_degrees) for part in text.split(",")]
         if count not in (None, len(values)):
             raise ValueError
     except NoAngle as no_angle:
@@ -70,7 +70,7 @@ def angles(scene: Any, option: str, text: str | None) -> tuple[float, ...] | Non
     if text is None:
         return None
     with located(scene.name):
-        return tuple(numbers(option, text, no_degrees=None))
+        return tuple(parse_numbers(option, text, no_degrees=None))
 
 
 def joint_limits(
@@ -93,7 +93,7 @@ def limit_pair(text: str) -> tuple[float, float]:
     """Return the least and the largest angle of 2.5, 120deg or -0.5:2, rad."""
     ends: list[float] = []
     for end in text.split(":"):
-        ends += numbers("--limits", end, 1, None)
+        ends += parse_numbers("--limits", end, 1, None)
     if len(ends) > 2:
         raise Refusal(
             f"{text!r} is no limit",
@@ -160,13 +160,13 @@ def is_angle(part: Any, key: str) -> bool:
 def spread(option: str, text: str, no_degrees: str | None = NO_ANGLE) -> list[float]:
     """Return the numbers of 0.5,1.0 or START:STOP:COUNT, all finite.
 
-    no_degrees: as for `numbers`."""
+    no_degrees: as for `parse_numbers`."""
     parts = text.split(":")
     if len(parts) == 1:
-        values = numbers(option, text, no_degrees=no_degrees)
+        values = parse_numbers(option, text, no_degrees=no_degrees)
     elif len(parts) == 3 and re.fullmatch(r"[1-9]\d{0,4}", parts[2]):
-        (start,) = numbers(option, parts[0], 1, no_degrees)
-        (stop,) = numbers(option, parts[1], 1, no_degrees)
+        (start,) = parse_numbers(option, parts[0], 1, no_degrees)
+        (stop,) = parse_numbers(option, parts[1], 1, no_degrees)
         count = int(parts[2])
         intervals = max(1, count - 1)
         values = [start + (stop - start) * k / intervals for k in range(count)]

@@ -18,7 +18,7 @@ from rft.core.refusal import in_line
 FILMS = (".gif", ".mp4")
 
 
-def numbers(values: Any) -> Any:
+def as_numbers(values: Any) -> Any:
     """Return a number or a list of numbers as a tuple; anything else as it is, for its
     reader to refuse."""
     if is_number(values):
@@ -28,7 +28,7 @@ def numbers(values: Any) -> Any:
     return tuple(np.asarray(values).tolist())
 
 
-def words(names: Any) -> Any:
+def as_words(names: Any) -> Any:
     """Return a name or a list of names as a tuple, none for None."""
     if names is None:
         return ()

@@ -33,7 +33,7 @@ class Velocity(Question):
 
     def __post_init__(self) -> None:
         self._set(
-            alpha=tools.numbers(self.alpha), alphadot=tools.numbers(self.alphadot)
+            alpha=tools.as_numbers(self.alpha), alphadot=tools.as_numbers(self.alphadot)
         )
 
     def compute(self, run: Run) -> Result:

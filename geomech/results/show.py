@@ -70,7 +70,7 @@ def parts(result: Result, everything: bool = False) -> list[str | Table]:
         shown = result
         rows = None
     found: list[str | Table] = [in_line(line) for line in kind.headline(result)]
-    for variables in by_dims(shown):
+    for variables in variables_by_dims(shown):
         if variables[0].dims:
             found += tables(shown, variables, rows)
         else:
@@ -98,7 +98,7 @@ def leaves_out(result: Result) -> bool:
     return long or len(shown) < len(result)
 
 
-def by_dims(result: Result) -> list[list[Variable]]:
+def variables_by_dims(result: Result) -> list[list[Variable]]:
     """Return the variables to be shown, those with the same dimensions together, in
     the order of the result."""
     groups: dict[tuple[str, ...], list[Variable]] = {}

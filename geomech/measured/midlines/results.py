@@ -50,7 +50,7 @@ def units_of(fit: Kinematics) -> dict[str, str]:
     }
 
 
-def of_trial(fit: Kinematics, comparison: Comparison | None = None) -> Result:
+def trial_result(fit: Kinematics, comparison: Comparison | None = None) -> Result:
     """Return all numbers of a trial. The errors are half widths of intervals."""
     units = units_of(fit)
     label = f"half width of the interval of {100 * fit.level:.3g} % of cases"
