@@ -147,6 +147,6 @@ def why_no_tier(tier: Any, system: System) -> str:
             taken = f"{first} to {last} joints"
         return f"they take {taken}, this body has {system.joints}"
     return (
-        f"the field has singular shapes, where {system.traits.singular}; maps and files "
-        "leave these out, and gaits that meet one are refused"
+        f"the field has singular shapes, where {system.traits.singular}; maps and "
+        "files leave these out, and gaits that meet one are refused"
     )

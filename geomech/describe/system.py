@@ -77,10 +77,10 @@ def notes(system: System) -> tuple[str, ...]:
         return ()
     return (
         f"the law {name_in(LAWS, system.medium)} has no closed form: its averages over "
-        f"an element are by quadrature ({QUADRATURE}) in place of exact integrals, which "
-        "takes some five times as long and, where drag is dry, is off by 1 to 7 % of the "
-        "displacement of three links, less of more; errors include it, and [numerics] "
-        'loads = "gauss:96" lowers it tenfold',
+        f"an element are by quadrature ({QUADRATURE}) in place of exact integrals, "
+        "which takes some five times as long and, where drag is dry, is off by 1 to 7 % "
+        "of the displacement of three links, less of more; errors include it, and "
+        '[numerics] loads = "gauss:96" lowers it tenfold',
     )
 
 
@@ -143,7 +143,8 @@ def table_lines(system: Table) -> list[str]:
         lines.append("its file tells intervals of A: they are part of every error")
     if not stored.has_residual:
         lines.append(
-            "the file does not tell what its fit left: errors are those of the grid alone"
+            "the file does not tell what its fit left: errors are those of the grid "
+            "alone"
         )
     if stored.computed is not None:
         lines += comparison_lines(system)
@@ -159,8 +160,8 @@ def table_lines(system: Table) -> list[str]:
         f"stored as {SIGNS[stored.sign]}, arrays as {stored.order}, lengths in "
         f"{stored.unit}, frame {frame}",
         *system.assumed,
-        "its field has the grid of the file; [numerics] grid, extent and directions say "
-        "nothing",
+        "its field has the grid of the file; [numerics] grid, extent and directions "
+        "say nothing",
     ]
 
 

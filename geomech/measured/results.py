@@ -32,8 +32,8 @@ def status(fit: Fitted) -> str:
         combinations.append(f"{fit.log.joints[k]} is {_sum(fit, factors)}")
     names = [fit.log.joints[k] for k in fit.combined]
     return (
-        f"{ALONG}: {', '.join(combinations)}, but for constants and noise, which leaves "
-        f"A across it open: leave {', '.join(names)} out of the columns"
+        f"{ALONG}: {', '.join(combinations)}, but for constants and noise, which "
+        f"leaves A across it open: leave {', '.join(names)} out of the columns"
     )
 
 
@@ -143,7 +143,8 @@ def _along(fit: Fitted) -> list[Variable]:
         Variable("phase", ("phase",), t, "rad", "of the mean gait"),
         Variable(
             "A_along", ("component", "joint", "phase"), A, rates,
-            "A along the mean gait", error, error_label="half width of the interval of A",
+            "A along the mean gait", error,
+            error_label="half width of the interval of A",
         ),
         Variable(
             "reach_along", ("phase",), _reach(fit), "rad",

@@ -85,8 +85,8 @@ class Accuracy(Question):
         if "own_error" in result:
             system_error = size(float(result["own_error"]))
             lines.append(
-                f"errors in the table include the system's own, {system_error} BL, which no "
-                "setting takes away; those below do not"
+                f"errors in the table include the system's own, {system_error} BL, "
+                "which no setting takes away; those below do not"
             )
         for k in range(result.sizes["setting"]):
             for name in ERRORS:

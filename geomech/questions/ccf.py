@@ -165,8 +165,9 @@ class Ccf(Question):
                 space.stretch, units(self.scene.system)["path_length"]
             )
         if space.other is not None:
-            other, error = space.other.curvature, space.other.curvature_error
-            found.append(fields.of_ccf(other, error, name="other_ccf"))
+            ccf = space.other.curvature
+            error = space.other.curvature_error
+            found.append(fields.of_ccf(ccf, error, name="other_ccf"))
         return Result("ccf", tuple(found), facts)
 
     @staticmethod

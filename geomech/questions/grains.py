@@ -80,9 +80,10 @@ class Grains(Question):
         facts = result.attributes
         length = 1e3 * float(result["body_length"])
         width = 2e3 * float(result["body_radius"])
+        frequency = float(result["frequency"])
         return [
             f"{facts['scene']} in {facts['grains']:,} grains, seed {facts['seed']}: "
-            f"body {length:g} mm long, {width:g} mm wide, {float(result['frequency']):g} Hz"
+            f"body {length:g} mm long, {width:g} mm wide, {frequency:g} Hz"
         ]
 
     @staticmethod

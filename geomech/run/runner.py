@@ -256,7 +256,7 @@ def _close_after(error: BaseException, store: Store) -> None:
         store.commit()
     if store.written:
         error.add_note(
-            f"{store.written} results so far are kept in {store.path}: the same command "
-            "goes on from there"
+            f"{store.written} results so far are kept in {store.path}: the same "
+            "command goes on from there"
         )
     store.close(done=not store.written)

@@ -388,7 +388,8 @@ def _cells(source: Rows, picks: Sequence[int]) -> np.ndarray:
             raise Refusal(
                 f"{len(cells)} cells under {width} columns",
                 where=f"{source.name}, line {line}",
-                instead="mend that row; a point that was not found is an empty cell between two"
+                instead="mend that row; a point that was not found is an empty cell "
+                "between two"
                 " separators",
             )
         for j, pick in enumerate(picks):

@@ -250,7 +250,9 @@ def _closing(c: Comparison, label: str) -> list[Variable]:
             error, error_label=label,
         ),
         Variable("bound", ("bound",), np.array(["low", "high"])),
-        Variable("parameter_tried", ("parameter", "bound"), tried, units, "range tried"),
+        Variable(
+            "parameter_tried", ("parameter", "bound"), tried, units, "range tried"
+        ),
     ]  # fmt: skip
 
 
