@@ -270,8 +270,10 @@ def _check_columns(
     columns = [c.removeprefix("%") for c in columns]
     missing = [c for c in columns if c not in header]
     if missing:
-        known = formatted(", ".join(header), 200)
-        raise Refusal(f"no column {formatted(missing[0])}; it has {known}", where=where)
+        existing = formatted(", ".join(header), 200)
+        raise Refusal(
+            f"no column {formatted(missing[0])}; it has {existing}", where=where
+        )
     if len(columns) < 6 or len({*columns}) < len(columns):
         raise Refusal(
             "``columns`` are those of t, two joint angles or more, x, y and heading, in"

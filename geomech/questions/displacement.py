@@ -124,7 +124,7 @@ class Displacement(Question):
         return cheapest(self.scene, self.values, tolerance, self.gait, ask)
 
     def check_draw(self, component: Sequence[str] = (), data: Any = None) -> None:
-        points(data, self.scene, component)
+        measured_points(data, self.scene, component)
 
     @staticmethod
     def headline(result: Result) -> list[str]:
@@ -191,14 +191,14 @@ class Displacement(Question):
         if ax is not None:
             return plots.displacement(result, ax=ax, quantity=quantity, data=data)
         if isinstance(data, str):
-            data = points(data, scene_of(result), component)
+            data = measured_points(data, scene_of(result), component)
         name = result.attributes["scene"]
         return plots.displacement_figure(
             {name: result}, components=component, data=data
         )
 
 
-def points(data: Any, scene: Any, component: Sequence[str]) -> Any:
+def measured_points(data: Any, scene: Any, component: Sequence[str]) -> Any:
     """Return measurements to be drawn: those of a file, which are of the quantity of
     one panel, or values as they are."""
     from pathlib import Path

@@ -14,7 +14,7 @@ from geomech.questions.common import ColourLimit, Panels
 from geomech.questions.displacement import (
     Displacement,
     amplitude_words,
-    points,
+    measured_points,
     tier_words,
 )
 from geomech.run.cost import Cost
@@ -76,7 +76,7 @@ class Run(Question):
         self, component: Any = (), clim: Any = None, data: Any = None
     ) -> None:
         parsing.one_limit(clim, component)
-        points(data, self.scene, component)
+        measured_points(data, self.scene, component)
 
     def compute(self, run: base.Run) -> Result:
         from geomech.studies import report
@@ -128,7 +128,7 @@ class Run(Question):
         from geomech.studies.report import tables_of
 
         if isinstance(data, str):
-            data = points(data, scene_of(result), component)
+            data = measured_points(data, scene_of(result), component)
         return plots.displacement_figure(
             tables_of(result), components=component, data=data
         )

@@ -1,7 +1,7 @@
 """Functions that several questions share."""
 
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
@@ -66,17 +66,6 @@ def option_text(value: Any) -> str:
 def component() -> Variable:
     """Return the coordinate of x, y and theta."""
     return Variable("component", ("component",), COMPONENTS)
-
-
-def seconds(took: Mapping[str, float], kept: Iterable[str]) -> list[Variable]:
-    """Return the seconds that parts of a computation took, and whether they were
-    computed before."""
-    before = [int(part in kept) for part in took]
-    return [
-        Variable("part", ("part",), np.array([*took], dtype="U")),
-        Variable("seconds", ("part",), [*took.values()], "s", "of computing"),
-        Variable("computed_before", ("part",), before, "1", "1 if it was"),
-    ]
 
 
 def selected(variable: Variable, dim: str, mask: list[bool]) -> Variable:

@@ -95,14 +95,14 @@ def formats(kind: Any) -> dict[str, Callable]:
 def writer(path: Path, kind: Any) -> Callable:
     """Return the writer (path, result) of a name; Refusal if its ending is no format of
     the kind."""
-    known = formats(kind)
+    writers = formats(kind)
     ending = path.suffix.lower()
-    if ending not in known:
+    if ending not in writers:
         raise Refusal(
             f"cannot write {path}",
-            instead=f"end the name in one of {', '.join(known)}",
+            instead=f"end the name in one of {', '.join(writers)}",
         )
-    return known[ending]
+    return writers[ending]
 
 
 def save(result: Result, path: Path, **options: Any) -> None:
