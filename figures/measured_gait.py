@@ -14,7 +14,7 @@ from geomech import plots
 from geomech.core.variables import Result
 from geomech.gaits import Ellipse
 from geomech.measured import Log, fit_log, synthetic
-from geomech.measured.results import of_fit
+from geomech.measured.results import fit_result
 from geomech.results import show
 from geomech.scenes import load
 
@@ -31,7 +31,7 @@ def compute(
     )
     lines = np.arange(len(log.t)) + 2
     fit = fit_log(Log("log.csv", log.t, log.alpha, log.pose, JOINTS, lines))
-    return of_fit(fit, mapped=False)
+    return fit_result(fit, mapped=False)
 
 
 def draw(numbers: Result):

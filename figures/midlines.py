@@ -11,7 +11,7 @@ from geomech import plots
 from geomech.core.variables import Result
 from geomech.measured.midlines.fit import fit_midlines
 from geomech.measured.midlines.predicted import compare
-from geomech.measured.midlines.results import of_trial
+from geomech.measured.midlines.results import trial_result
 from geomech.measured.midlines.synthetic import synthetic_midlines
 from geomech.results import show
 from geomech.systems import Swimmer
@@ -26,7 +26,7 @@ def compute(
     swimmer = Swimmer(MEDIA["glass-0.3mm-loose"], Backbone(40))
     trial = synthetic_midlines(swimmer, cycles, seed=seed).trial("trial.csv")
     fit = fit_midlines(trial)
-    return of_trial(fit, compare(fit, MEDIA[medium]))
+    return trial_result(fit, compare(fit, MEDIA[medium]))
 
 
 def draw(numbers: Result):

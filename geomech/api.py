@@ -1,5 +1,5 @@
-"""What ``import geomech`` offers beside the parts: the study of a scene, whose methods ask
-questions."""
+"""What ``import geomech`` offers besides the parts: the study of a scene, whose methods
+ask questions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any, Concatenate, ParamSpec
 
 from geomech.core.variables import Result
 from geomech.questions.accuracy import Accuracy
-from geomech.questions.base import Question, plain_type
+from geomech.questions.base import Question, options, plain_type, subject_field
 from geomech.questions.ccf import Ccf
 from geomech.questions.connection import Connection
 from geomech.questions.displacement import Displacement
@@ -25,6 +25,7 @@ from geomech.questions.intrude import Intrude
 from geomech.questions.optimize import Optimize
 from geomech.questions.run import Run
 from geomech.questions.sweep import Sweep
+from geomech.questions.tools import is_film
 from geomech.questions.trajectory import Trajectory
 from geomech.questions.velocity import Velocity
 from geomech.questions.walk import Walk
@@ -35,10 +36,10 @@ from rft.core.refusal import Refusal
 Fields = ParamSpec("Fields")
 
 
-def asks(
+def method(
     question: Callable[Concatenate[Any, Fields], Question],
 ) -> Callable[Concatenate[Study, Fields], Result]:
-    """Return the method that asks a question of a study's scene.
+    """Return the method of `Study` that asks a question of its scene.
 
     Its parameters are the fields of the question; unknown ones are refused."""
 
@@ -46,65 +47,66 @@ def asks(
         refuse_unknown(question, options)
         return question(self.scene, *values, **options).ask(self._tables)
 
-    described(ask, question, "self")
+    describe(ask, question, "self")
     return ask
 
 
-def asked_of_scene(
+def function_of_scene(
     question: Callable[Concatenate[Any, Fields], Question],
 ) -> Callable[Concatenate[Any, Fields], Result]:
-    """Return the function that asks a question of whatever `study` takes for a scene."""
+    """Return the function that asks a question of a scene, in any form that `study`
+    takes."""
 
     def ask(scene: Any, *values: Fields.args, **options: Fields.kwargs) -> Result:
         refuse_unknown(question, options)
         return question(as_scene(scene), *values, **options).ask()
 
-    described(ask, question, "scene")
+    describe(ask, question, "scene")
     return ask
 
 
-def asked_of_file(
+def function_of_file(
     question: Callable[Concatenate[Any, Fields], Question],
 ) -> Callable[Concatenate[Any, Fields], Result]:
-    """Return the function that asks a question of measurements, mostly those of a file."""
+    """Return the function that asks a question of measurements, mostly of a file."""
 
     def ask(file: Any, *values: Fields.args, **options: Fields.kwargs) -> Result:
         refuse_unknown(question, options)
         return question(file, *values, **options).ask()
 
-    described(ask, question, "file")
+    describe(ask, question, "file")
     return ask
 
 
-def asked_alone(
+def function_of_options(
     question: Callable[Fields, Question],
 ) -> Callable[Fields, Result]:
-    """Return the function that asks a question that consists of options alone."""
+    """Return the function that asks a question that has options alone."""
 
     def ask(*values: Fields.args, **options: Fields.kwargs) -> Result:
         refuse_unknown(question, options)
         return question(*values, **options).ask()
 
-    described(ask, question)
+    describe(ask, question, "")
     return ask
 
 
-def described(ask: Any, question: Any, first: str = "") -> None:
+def describe(ask: Any, question: Any, subject: str) -> None:
     """Give a function the name, the documentation and the parameters of a question.
 
-    first: name of the parameter that the question is about, "" if there is none."""
+    subject: name of the parameter that the question is about; "" without one."""
     fields = list(inspect.signature(question).parameters.values())
-    shown = []
-    if first:
+    parameters = []
+    if subject:
         kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
-        shown.append(inspect.Parameter(first, kind, annotation=Any))
+        parameters.append(inspect.Parameter(subject, kind, annotation=Any))
         del fields[0]
     for field in fields:
         annotation = field.annotation
         if hasattr(annotation, "__metadata__"):
             annotation = plain_type(annotation)
-        shown.append(field.replace(annotation=annotation))
-    ask.__signature__ = inspect.Signature(shown, return_annotation=Result)
+        parameters.append(field.replace(annotation=annotation))
+    ask.__signature__ = inspect.Signature(parameters, return_annotation=Result)
     ask.__name__ = question.name
     ask.__qualname__ = question.name
     ask.__doc__ = documentation(question)
@@ -112,8 +114,6 @@ def described(ask: Any, question: Any, first: str = "") -> None:
 
 def documentation(question: Any) -> str:
     """Return what a question computes, and what its fields mean."""
-    from geomech.questions.base import options
-
     lines = [inspect.cleandoc(question.__doc__), "", "Parameters", "----------"]
     for name, (option, _, _) in options(question).items():
         lines += [name, f"    {option.help}"]
@@ -122,23 +122,22 @@ def documentation(question: Any) -> str:
 
 def option_names(question: Any) -> list[str]:
     """Return the names of a question's options."""
-    from geomech.questions.base import subject_field
-
     subject, _ = subject_field(question)
     names = inspect.signature(question).parameters
     return [name for name in names if name != subject]
 
 
-def refuse_unknown(question: Any, options: dict[str, Any]) -> None:
+def refuse_unknown(question: Any, given: dict[str, Any]) -> None:
     """Refuse keywords that are no fields of a question, with the nearest that is."""
-    known = option_names(question)
-    for name in options:
-        if name not in known:
-            nearest = difflib.get_close_matches(name, known, 1)
-            instead = f"use one of {', '.join(known)}"
-            if nearest:
-                instead = f"did you mean {nearest[0]!r}?"
-            raise Refusal(f"{question.name} has no {name!r}", instead=instead)
+    names = option_names(question)
+    for name in given:
+        if name in names:
+            continue
+        instead = f"use one of {', '.join(names)}"
+        nearest = difflib.get_close_matches(name, names, 1)
+        if nearest:
+            instead = f"did you mean {nearest[0]!r}?"
+        raise Refusal(f"{question.name} has no {name!r}", instead=instead)
 
 
 class Study:
@@ -154,9 +153,9 @@ class Study:
         body, or a system, or a function velocity(alpha, alphadot) -> xi (..., 3), and a
         gait.
     effects : list of effects
-        Those of a medium and a body.
+        Additions to the law, of a medium and a body.
     **numerics :
-        Other settings than the scene's, such as grid=21, phases=64.
+        Settings in place of the scene's, such as grid=21, phases=64.
 
     Examples
     --------
@@ -194,23 +193,23 @@ class Study:
             raise Refusal("this scene has no shape space", where=self.scene.name)
         return self._tables
 
-    displacement = asks(Displacement)
-    ccf = asks(Ccf)
-    connection = asks(Connection)
-    velocity = asks(Velocity)
-    sweep = asks(Sweep)
-    run = asks(Run)
-    forces = asks(Forces)
-    optimise = optimize = asks(Optimize)
-    trajectory = asks(Trajectory)
-    walk = asks(Walk)
-    intrude = asks(Intrude)
-    grains = asks(Grains)
-    accuracy = asks(Accuracy)
+    displacement = method(Displacement)
+    ccf = method(Ccf)
+    connection = method(Connection)
+    velocity = method(Velocity)
+    sweep = method(Sweep)
+    run = method(Run)
+    forces = method(Forces)
+    optimise = optimize = method(Optimize)
+    trajectory = method(Trajectory)
+    walk = method(Walk)
+    intrude = method(Intrude)
+    grains = method(Grains)
+    accuracy = method(Accuracy)
 
     def animate(self, path: str | Path = "swim.gif", *, cycles: int = 1) -> Path:
-        """Write a film of the body beside its gait on the CCF, .gif or .mp4, or a strip of
-        it, .png, .pdf or .svg; return its path.
+        """Write a film of the body beside its gait on the CCF, .gif or .mp4, or a strip
+        of it, .png, .pdf or .svg; return its path.
 
         Examples
         --------
@@ -221,7 +220,6 @@ class Study:
         'swim.png'
         """
         from geomech import films, plots
-        from geomech.questions.tools import is_film
 
         path = Path(path)
         if is_film(path):
@@ -234,9 +232,9 @@ class Study:
 
 
 def study(*parts: Any, effects: Sequence = (), **numerics: Any) -> Study:
-    """Return the study of a scene: `study("three-link-glass")`, of a TOML file, a Scene,
-    or its parts: `study(medium, body, gait)`, `study(system, gait)`, `study(velocity,
-    gait)`. See `Study`.
+    """Return the study of a scene: `study("three-link-glass")`, of a TOML file, a
+    Scene, or its parts: `study(medium, body, gait)`, `study(system, gait)`,
+    `study(velocity, gait)`. See `Study`.
 
     Examples
     --------
@@ -269,17 +267,17 @@ def load_result(path: str | Path) -> Result:
     return load(path)
 
 
-displacement = asked_of_scene(Displacement)
-ccf = asked_of_scene(Ccf)
-velocity = asked_of_scene(Velocity)
-sweep = asked_of_scene(Sweep)
-forces = asked_of_scene(Forces)
-optimise = optimize = asked_of_scene(Optimize)
-trajectory = asked_of_scene(Trajectory)
-walk = asked_of_scene(Walk)
-intrude = asked_of_scene(Intrude)
-grains = asked_of_scene(Grains)
-drag_grains = asked_alone(DragGrains)
-fit_medium = asked_of_file(FitMedium)
-accuracy = asked_of_scene(Accuracy)
-fit_gait = asked_of_file(FitGait)
+displacement = function_of_scene(Displacement)
+ccf = function_of_scene(Ccf)
+velocity = function_of_scene(Velocity)
+sweep = function_of_scene(Sweep)
+forces = function_of_scene(Forces)
+optimise = optimize = function_of_scene(Optimize)
+trajectory = function_of_scene(Trajectory)
+walk = function_of_scene(Walk)
+intrude = function_of_scene(Intrude)
+grains = function_of_scene(Grains)
+drag_grains = function_of_options(DragGrains)
+fit_medium = function_of_file(FitMedium)
+accuracy = function_of_scene(Accuracy)
+fit_gait = function_of_file(FitGait)

@@ -1,4 +1,5 @@
-"""The command line: the commands of `geomech.questions`, and those that ask none."""
+"""The command line: the commands of `geomech.questions`, and those that ask no
+question."""
 
 from __future__ import annotations
 
@@ -17,10 +18,12 @@ from geomech.options import PluginOption, load_plugins, with_plugins, with_worke
 
 
 class Commands(Mapping[str, Any]):
-    """All commands by their names as they are typed; each is loaded at its first use."""
+    """All commands by their names as they are typed; each is loaded at its first
+    use."""
 
     def __iter__(self) -> Iterator[str]:
-        return (typed(name) for names in headings().values() for name in names)
+        for names in headings().values():
+            yield from map(command_word, names)
 
     def __len__(self) -> int:
         return sum(map(len, headings().values()))
@@ -28,7 +31,7 @@ class Commands(Mapping[str, Any]):
     def __getitem__(self, name: str) -> Any:
         if name not in iter(self):
             raise KeyError(name)
-        return loaded(name.replace("-", "_"))
+        return load_command(name.replace("-", "_"))
 
 
 class Group(TyperGroup):
@@ -42,9 +45,9 @@ class Group(TyperGroup):
         return [*self.commands]
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        wide = max(map(len, self.list_commands(ctx)))
+        width = max(map(len, self.list_commands(ctx)))
         for heading, names in headings().items():
-            rows = [(typed(name).ljust(wide), summary(name)) for name in names]
+            rows = [(command_word(name).ljust(width), summary(name)) for name in names]
             with formatter.section(heading):
                 formatter.write_dl(rows)
 
@@ -61,7 +64,7 @@ def headings() -> dict[str, list[str]]:
     return found
 
 
-def typed(name: str) -> str:
+def command_word(name: str) -> str:
     """Return the name of a command as it is typed."""
     return name.replace("_", "-")
 
@@ -74,12 +77,12 @@ def summary(name: str) -> str:
 
 
 @functools.cache
-def loaded(name: str) -> Any:
-    """Return a command: that of its question, or one of those that ask none."""
+def load_command(name: str) -> Any:
+    """Return a command by its name: of a question, or one that asks none."""
     single = typer.Typer(
         pretty_exceptions_enable=False, rich_markup_mode=None, add_completion=False
     )
-    single.command(typed(name))(with_plugins(function(name)))
+    single.command(command_word(name))(with_plugins(function(name)))
     return typer.main.get_command(single)
 
 
@@ -120,14 +123,15 @@ def geomech(
     """Geometric mechanics of locomotion: from a force law to displacement."""
     from geomech.run.backend import prefer
 
-    # NumPy's first call takes half a second less; the pipeline knows who has much to do.
+    # NumPy's first call takes half a second less; the pipeline knows who has much to
+    # do.
     prefer("numpy")
     load_plugins(plugin)
 
 
 def main(argv: list[str] | None = None) -> None:
-    """Run a command and exit: one line on standard error and code 2 for a mistake, 128 +
-    its number for a signal."""
+    """Run a command and exit: one line on standard error and code 2 for a mistake, 128
+    + its number for a signal."""
     terminal.limit_threads()
     arguments = (sys.argv[1:] if argv is None else argv) or ["--help"]
     # What the command prefers ends with its context.

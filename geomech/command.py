@@ -1,4 +1,4 @@
-"""The command of a question, made from its declaration."""
+"""The command of a question, built from its declaration."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ SUBJECT = "subject"  # name of the first argument in the function of a command
 class Declaration(NamedTuple):
     """All that the command of a question takes.
 
-    files: options of the functions that write a file, by ending, FOLDER of the one that
-    fills the question's folder."""
+    fields: its own options. picture: options of its picture. files: options of its
+    files by ending, and by FOLDER those of the folder that its command fills."""
 
     question: type[Question]
     subject: base.Subject | None
@@ -37,8 +37,8 @@ class Declaration(NamedTuple):
     files: dict[str, Declared]
 
     @property
-    def of_files(self) -> Declared:
-        """Options of all files."""
+    def all_files(self) -> Declared:
+        """Options of files of every ending."""
         found = {}
         for options in self.files.values():
             found.update(options)
@@ -74,20 +74,22 @@ def command(question: type[Question]) -> Callable[..., None]:
     declared = declaration(question)
 
     def run(**given: Any) -> None:
-        asked, outputs = request(declared, given)
+        instance, outputs = request(declared, given)
         pipeline.execute(
-            asked,
+            instance,
             outputs,
             as_json=given["as_json"],
             yes=given["yes"],
             everything=given["everything"],
         )
 
-    taken = parameters(declared)
+    signature = inspect.Signature(parameters(declared))
     run.__name__ = question.name
     run.__doc__ = question.__doc__
-    run.__signature__ = inspect.Signature(taken)  # type: ignore[attr-defined]
-    run.__annotations__ = {p.name: p.annotation for p in taken}
+    run.__signature__ = signature  # type: ignore[attr-defined]
+    run.__annotations__ = {
+        name: parameter.annotation for name, parameter in signature.parameters.items()
+    }
     return run
 
 
@@ -96,24 +98,24 @@ def command(question: type[Question]) -> Callable[..., None]:
 
 def parameters(declared: Declaration) -> list[inspect.Parameter]:
     """Return the parameters of a command in the order of its help: the subject, the
-    question's own, those that change the subject, those of pictures and files, and those
-    of every command."""
+    question's own, those that change the subject, those of pictures and files, and
+    those of every command."""
     found = []
     changes: tuple[str, ...] = ()
     if declared.subject is not None:
         found.append(subject_parameter(declared.subject))
         changes = declared.subject.changes
-    found += [typed(name, *one) for name, one in declared.fields.items()]
+    for name, declaration in declared.fields.items():
+        found.append(option_parameter(name, *declaration))
     for name in changes:
         found.append(parameter(name, CHANGES[name], None))
-    found += [typed(name, *one) for name, one in declared.picture.items()]
-    for name, one in declared.of_files.items():
-        if name not in declared.picture:
-            found.append(typed(name, *one))
-    return found + common(declared.question)
+    files_alone = without(declared.all_files, declared.picture)
+    for name, declaration in {**declared.picture, **files_alone}.items():
+        found.append(option_parameter(name, *declaration))
+    return found + common_parameters(declared.question)
 
 
-def common(question: type[Question]) -> list[inspect.Parameter]:
+def common_parameters(question: type[Question]) -> list[inspect.Parameter]:
     """Return the parameters of every command."""
     found = [output_parameter(question)]
     if question.draw is not None:
@@ -173,7 +175,9 @@ def subject_parameter(subject: base.Subject) -> inspect.Parameter:
     return parameter(SUBJECT, annotation)
 
 
-def typed(name: str, option: Option, kind: Any, default: Any) -> inspect.Parameter:
+def option_parameter(
+    name: str, option: Option, kind: Any, default: Any
+) -> inspect.Parameter:
     """Return the parameter of an option."""
     settings = typer.Option(
         base.flag(name, option), metavar=option.metavar or None, help=option.help
@@ -192,7 +196,7 @@ def read_type(option: Option, kind: Any) -> Any:
         return list[str]
     if option.parse is not None:
         return str
-    kind = base.of_union(kind)
+    kind = base.without_none(kind)
     if kind in (int, float, Path):
         return kind
     return str
@@ -205,31 +209,35 @@ def request(
     declared: Declaration, given: dict[str, Any]
 ) -> tuple[Question, list[pipeline.Output]]:
     """Return the question and the outputs that the values of a command ask for."""
-    paths = [path_of(name) for name in given["out"] or ()]
+    kind = declared.question
+    paths = [output_path(name) for name in given["out"] or ()]
     plot = given.get("plot")
-    if paths:
-        writers = declared.question.files()
-        declared = declared._replace(files=file_options(declared.question, writers))
+    if paths:  # plug-ins may add formats
+        declared = declared._replace(files=file_options(kind, kind.files()))
     refuse_unused(declared, given, paths)
-    about = []
-    if declared.subject is not None:
+
+    subject = None
+    if declared.subject is None:
+        question = kind(**option_values(declared.fields, given, None))
+    else:
         changes = {name: given[name] for name in declared.subject.changes}
-        about.append(declared.subject.load(given[SUBJECT], **changes))
-    subject = about[0] if about else None
-    question = declared.question(*about, **parsed(declared.fields, given, subject))
-    of_files = {}
+        subject = declared.subject.load(given[SUBJECT], **changes)
+        question = kind(subject, **option_values(declared.fields, given, subject))
+
+    file_values = {}
     for ending, options in declared.files.items():
-        of_files[ending] = parsed(options, given, subject)
+        file_values[ending] = option_values(options, given, subject)
     outputs = []
     for path in paths:
-        options = of_files.get(path.suffix.lower(), {})
-        if declared.question.folder:
-            options = of_files[FOLDER]
-        outputs.append(output(declared.question, path, options))
-    picture = parsed(declared.picture, given, subject)
-    question = question.for_files(paths, parsed(declared.of_files, given, subject))
-    if declared.question.folder:
-        question.check_draw(**of_files[FOLDER])
+        values = file_values.get(path.suffix.lower(), {})
+        if kind.folder:
+            values = file_values[FOLDER]
+        outputs.append(output(kind, path, values))
+    picture = option_values(declared.picture, given, subject)
+    all_values = option_values(declared.all_files, given, subject)
+    question = question.for_files(paths, all_values)
+    if kind.folder:
+        question.check_draw(**file_values[FOLDER])
     if plot is not None:
         question.check_draw(**picture)
         outputs.append(figure(plot, picture))
@@ -237,7 +245,9 @@ def request(
     return question, outputs
 
 
-def parsed(options: Declared, given: dict[str, Any], subject: Any) -> dict[str, Any]:
+def option_values(
+    options: Declared, given: dict[str, Any], subject: Any
+) -> dict[str, Any]:
     """Return the values of the options that are given."""
     values = {}
     for name, (option, _, default) in options.items():
@@ -250,7 +260,7 @@ def parsed(options: Declared, given: dict[str, Any], subject: Any) -> dict[str, 
     return values
 
 
-def path_of(name: str) -> Path:
+def output_path(name: str) -> Path:
     """Return the path of an output; an empty name is refused."""
     if not name:
         raise Refusal(
@@ -265,32 +275,38 @@ def refuse_unused(
     declared: Declaration, given: dict[str, Any], paths: list[Path]
 ) -> None:
     """Refuse options of figures and files that are not written."""
-    in_folder = declared.files.get(FOLDER, {})
     if given.get("plot") is None:
-        unused = {k: one for k, one in declared.picture.items() if k not in in_folder}
+        used = declared.files.get(FOLDER, {})
+        unused = without(declared.picture, used)
         refuse_given(unused, given, "for a figure", "say --plot FILE, too")
-    written = {path.suffix.lower() for path in paths}
-    taken: set[str] = set()
-    for ending in written:
-        taken |= {*declared.files.get(ending, {})}
+    used = {}
+    for path in paths:
+        used.update(declared.files.get(path.suffix.lower(), {}))
     for ending, options in declared.files.items():
-        if ending == FOLDER:
-            continue
-        unused = {name: one for name, one in options.items() if name not in taken}
-        refuse_given(unused, given, f"for a {ending} file", f"say -o FILE{ending}, too")
+        if ending != FOLDER:
+            unused = without(options, used)
+            instead = f"say -o FILE{ending}, too"
+            refuse_given(unused, given, f"for a {ending} file", instead)
+
+
+def without(options: Declared, others: Declared) -> Declared:
+    """Return the options that are not among others."""
+    return {name: options[name] for name in options if name not in others}
 
 
 def refuse_given(
-    options: Declared, given: dict[str, Any], what: str, instead: str
+    options: Declared, given: dict[str, Any], purpose: str, instead: str
 ) -> None:
-    """Refuse options that are given."""
+    """Refuse those of the options that are given, with their purpose."""
     names = []
     for name, (option, _, _) in options.items():
         if given[name]:
             names.append(base.flag(name, option))
     if names:
-        verb = "is" if len(names) == 1 else "are"
-        raise Refusal(f"{' and '.join(names)} {verb} {what}", instead=instead)
+        verb = "are"
+        if len(names) == 1:
+            verb = "is"
+        raise Refusal(f"{' and '.join(names)} {verb} {purpose}", instead=instead)
 
 
 def output(

@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import Any
 
 from geomech import plots
-from geomech.describe.system import described
+from geomech.describe.system import system_lines
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
 from geomech.results.html import encoded, escaped, row
@@ -51,7 +51,7 @@ def study(tables: SceneTables) -> str:
     with the scene's gait."""
     scene, computed = tables.scene, {key[0] for key in tables.computed}
     rows = [
-        ("system", described(scene.system)[0]),
+        ("system", system_lines(scene.system)[0]),
         ("gait", repr(scene.gait)),
         ("numerics", repr(scene.numerics)),
         ("tiers", ", ".join(tables.tiers)),

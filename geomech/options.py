@@ -1,5 +1,5 @@
-"""Options of commands besides the fields of their questions: plug-ins, workers, and changes
-of a scene."""
+"""Options of commands besides the fields of their questions: plug-ins, workers, and
+changes of a scene."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ YesOption = Annotated[
 # Changes of a scene
 
 
-def an_angle(text: str | float) -> float:
+def parse_angle(text: str | float) -> float:
     """Return an option that is an angle, 2.5 or 120deg, in rad."""
     try:
-        return texts.number(str(text), None)
+        return texts.parse_number(str(text), None)
     except ValueError:
         raise typer.BadParameter(
             f"{text!r} is no angle: give one such as 2.5 (rad) or 120deg"
@@ -50,7 +50,7 @@ ExtentOption = Annotated[
         "--extent",
         metavar="ANGLE",
         help="half width of the grid in rad, or as 120deg",
-        parser=an_angle,
+        parser=parse_angle,
     ),
 ]
 MediumOption = Annotated[
@@ -73,7 +73,7 @@ PluginOption = Annotated[
         help="Python file with parts of your own, such as laws",
     ),
 ]
-ABOUT = {"name", "subject"}  # first arguments of commands that take plug-ins
+SUBJECTS = {"name", "subject"}  # first arguments of commands that take plug-ins
 
 
 def load_plugins(files: list[Path] | None) -> None:
@@ -85,10 +85,10 @@ def load_plugins(files: list[Path] | None) -> None:
 
 
 def with_plugins(command: Callable) -> Callable:
-    """Return a command that also takes ``--plugin`` if it is about a scene; any other as
-    it is."""
-    taken = {*inspect.signature(command).parameters}
-    if not ABOUT & taken or "plugin" in taken:
+    """Return a command that also takes ``--plugin`` if it is about a scene; any other
+    as it is."""
+    names = {*inspect.signature(command).parameters}
+    if not SUBJECTS & names or "plugin" in names:
         return command
 
     def run(plugin: list[Path] | None = None, **arguments: Any) -> Any:
@@ -135,7 +135,8 @@ def with_workers(command: Callable) -> Callable:
 
 
 def extended(run: Callable, command: Callable, more: dict[str, Any]) -> Callable:
-    """Return ``run`` as a command with the parameters of another one and more options."""
+    """Return ``run`` as a command with the parameters of another one and more
+    options."""
     functools.update_wrapper(run, command)
     signature = inspect.signature(command, eval_str=True)
     parameters = [*signature.parameters.values()]

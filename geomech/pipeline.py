@@ -9,18 +9,18 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from geomech import terminal
 from geomech.core.errors import Note
+from geomech.core.summary import wrapped
+from geomech.core.variables import Result
 from geomech.io.files import atomic_file, atomic_folder, note, refuse_inputs
-from geomech.questions.base import Run, ignore
+from geomech.questions.base import Question, Run, ignore
+from geomech.results import show
+from geomech.run.backend import prefer_for
+from geomech.run.cost import Cost, decide
 from rft.core.refusal import Refusal, in_line
-
-if TYPE_CHECKING:  # commands start without NumPy
-    from geomech.core.variables import Result
-    from geomech.questions.base import Question
-    from geomech.run.cost import Cost
 
 MORE = "--all prints all variables"
 
@@ -70,7 +70,7 @@ def execute(
 
 
 def notes_of(result: Result) -> list[str]:
-    """Return what a result says besides its numbers."""
+    """Return the notes of a result, which a command prints on standard error."""
     if "note" not in result:
         return []
     return result["note"].values.tolist()
@@ -78,9 +78,6 @@ def notes_of(result: Result) -> list[str]:
 
 def printed(result: Result, as_json: bool, everything: bool) -> list[str]:
     """Return the lines that a command prints."""
-    from geomech.core.summary import wrapped
-    from geomech.results import show
-
     if as_json:
         return [json.dumps(result.to_dict())]
     lines = show.lines(result, everything)
@@ -93,8 +90,6 @@ def printed(result: Result, as_json: bool, everything: bool) -> list[str]:
 
 def contents(folders: Iterable[Path]) -> list[str]:
     """Return lines that name the files of folders."""
-    from geomech.core.summary import wrapped
-
     lines = []
     for folder in folders:
         names = sorted(p.name for p in folder.iterdir() if not p.name.startswith("."))
@@ -109,7 +104,8 @@ def contents(folders: Iterable[Path]) -> list[str]:
 def computing(
     question: Question, outputs: Sequence[Output], inputs: list[Path], yes: bool
 ) -> Iterator[Callable]:
-    """Yield the function that shows the progress of a question, once its cost is allowed.
+    """Yield the function that shows the progress of a question, once its cost is
+    allowed.
 
     Finished tasks are stored next to its first output or, of results that are only
     printed, in the user's cache folder; the same command resumes from there."""
@@ -128,19 +124,16 @@ def computing(
 
 
 def takes_time(question: Question) -> bool:
-    """Return whether progress is shown: of questions about measurements and media it is
+    """Return whether progress is shown; of questions about measurements and media it is
     not."""
     return hasattr(question, "scene") or question.subject is None
 
 
 def allow(question: Question, cost: Cost, yes: bool) -> None:
-    """Print the cost of a question if it takes long; Refusal, with what to do instead, if
-    it takes too long to begin without --yes: here, or in its first second
+    """Print the cost of a question if it takes long; Refusal, with what to do instead,
+    if it takes too long to begin without --yes: here, or in its first second
     (`geomech.run.cost.decide`). From here on "auto" is the back end for that many
     balances."""
-    from geomech.run.backend import prefer_for
-    from geomech.run.cost import decide
-
     name = question.subject_name
 
     def judge(cost: Cost) -> None:
@@ -154,7 +147,7 @@ def allow(question: Question, cost: Cost, yes: bool) -> None:
 
 
 def note_system(question: Question) -> None:
-    """Warn of what is likely not meant, once a command. An intruder scene has no
+    """Warn of what is likely not meant, once per command. An intruder scene has no
     system."""
     from geomech.describe.system import notes
 
@@ -190,7 +183,8 @@ def storing(
 
 
 def refuse_unwritable(outputs: Sequence[Output], inputs: list[Path]) -> None:
-    """Refuse outputs that cannot be written, that are inputs, or that are named twice."""
+    """Refuse outputs that cannot be written, that are inputs, or that are named
+    twice."""
     files = [output.path for output in outputs if not output.folder]
     for k, path in enumerate(files):
         if path in files[:k]:
@@ -211,8 +205,8 @@ class _Unused(Exception):
 
 @contextlib.contextmanager
 def place(output: Output, inputs: list[Path]) -> Iterator[Path]:
-    """Yield the path to write to: a folder is filled elsewhere, and appears whole or not
-    at all."""
+    """Yield the path to write to: a folder is filled elsewhere, and appears complete or
+    not at all."""
     if not output.folder:
         yield output.path
         return

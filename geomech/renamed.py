@@ -1,4 +1,7 @@
-"""Commands and options that were renamed in version 0.1: the old spellings work until the next version, with a note."""
+"""Commands and options that were renamed in version 0.1.
+
+The old spellings work until the next version, with a note.
+"""
 
 from __future__ import annotations
 
@@ -22,18 +25,19 @@ OPTIONS = {
 
 
 def current(words: list[str]) -> list[str]:
-    """Return a command's name and its arguments in the current spelling; `Note` for each old one."""
+    """Return a command's name and its arguments in the current spelling; `Note` for
+    each old one."""
     name, *arguments = words
-    options = arguments[: arguments.index("--")] if "--" in arguments else arguments
-    return [
-        _current(name, COMMANDS),
-        *(_current(x, OPTIONS) for x in options),
-        *arguments[len(options) :],
-    ]
+    last = len(arguments)
+    if "--" in arguments:  # what follows are no options
+        last = arguments.index("--")
+    options = [current_word(word, OPTIONS) for word in arguments[:last]]
+    return [current_word(name, COMMANDS), *options, *arguments[last:]]
 
 
-def _current(word: str, renamed: dict[str, str]) -> str:
-    """Return a command, or an option such as --for or --for=speed, in the current spelling."""
+def current_word(word: str, renamed: dict[str, str]) -> str:
+    """Return a command, or an option such as --for or --for=speed, in the current
+    spelling."""
     old, equals, value = word.partition("=")
     if old not in renamed:
         return word
@@ -42,4 +46,4 @@ def _current(word: str, renamed: dict[str, str]) -> str:
         Note,
         stacklevel=3,
     )
-    return renamed[old] + equals + value
+    return f"{renamed[old]}{equals}{value}"

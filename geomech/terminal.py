@@ -1,4 +1,5 @@
-"""The terminal of a command: one line for an error, a bar for progress, handlers for signals."""
+"""The terminal of a command: one line for an error, a bar for progress, handlers of
+signals."""
 
 from __future__ import annotations
 
@@ -17,6 +18,7 @@ import traceback
 import warnings
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 import typer
 
@@ -28,6 +30,7 @@ from rft.core.refusal import Refusal, line, printable, spell_arguments
 __all__ = ["Stopped", "exit_code", "progress", "report", "show", "stoppable"]
 
 LONGEST = 2000  # characters of an error
+# Modules that print, and write no files.
 PRINTING = (
     "geomech.cli",
     "geomech.describe",
@@ -35,66 +38,91 @@ PRINTING = (
     "geomech.terminal",
     "click",
     "typer",
-)  # modules that print; no files
-PATIENCE = 2.0  # s after a signal in which further ones are ignored: finished tasks are being stored
+)
+# s after a signal in which further ones are ignored: finished tasks are being stored.
+PATIENCE = 2.0
+SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")  # those that stop a command
+INTERRUPTED = 130  # exit code of a command that SIGINT stopped
+# What a reader of a command types where its name is not that of the argument.
+OPTIONS = {
+    "tolerance": "--tol",
+    "at": "--slice",
+    "drawn": "--plot",
+    "longest": "--yes",
+    "geomech.register": "--plugin FILE.py",
+    "Study.ccf(pair=...)": "geomech ccf --pair",
+}
 
 
 class Stopped(BaseException):
     """A signal asked to stop."""
 
     def __init__(self, number: int):
-        self.name, self.code = signal.Signals(number).name, 128 + number
+        self.name = signal.Signals(number).name
+        self.code = 128 + number
 
 
 @contextlib.contextmanager
 def stoppable() -> Iterator[None]:
-    """Raise `Stopped` on INT, TERM and HUP, so that no file stays half-written. Signals that are ignored, as HUP is under
-    nohup, stay ignored."""
-    last = [-math.inf]
+    """Raise `Stopped` on INT, TERM and HUP, so that no file stays half-written.
+
+    Signals that are ignored, as HUP is under nohup, stay ignored."""
+    last_stop = -math.inf
 
     def stop(number, frame):
-        if time.monotonic() > last[0] + PATIENCE:
-            last[0] = time.monotonic()
+        nonlocal last_stop
+        if time.monotonic() > last_stop + PATIENCE:
+            last_stop = time.monotonic()
             raise Stopped(number)
 
-    numbers = [
-        getattr(signal, name)
-        for name in ("SIGINT", "SIGTERM", "SIGHUP")
-        if hasattr(signal, name)
-    ]
-    before = {
-        n: signal.getsignal(n)
-        for n in numbers
-        if threading.current_thread() is threading.main_thread()
-    }
-    before = {
-        n: handler
-        for n, handler in before.items()
-        if handler not in (signal.SIG_IGN, None)
-    }
-    for n in before:
-        signal.signal(n, stop)
+    former = former_handlers()
+    for number in former:
+        signal.signal(number, stop)
     try:
         yield
     finally:
-        for n, handler in before.items():
-            signal.signal(n, handler)
+        for number, handler in former.items():
+            signal.signal(number, handler)
+
+
+def former_handlers() -> dict[int, Any]:
+    """Return the handlers of the signals that stop a command, by number; without those
+    that are ignored. Only the main thread has any."""
+    if threading.current_thread() is not threading.main_thread():
+        return {}
+    handlers = {}
+    for name in SIGNALS:
+        if not hasattr(signal, name):  # Windows has no HUP
+            continue
+        number = getattr(signal, name)
+        handler = signal.getsignal(number)
+        if handler not in (signal.SIG_IGN, None):
+            handlers[number] = handler
+    return handlers
 
 
 def limit_threads() -> None:
-    """Let the libraries below NumPy, which loads later, take one thread: small matrices gain nothing from more, their threads
-    wait by turning in circles, and sums that are shared out end in other digits."""
+    """Let the libraries below NumPy, which loads later, take one thread.
+
+    Small matrices gain nothing from more threads, which wait in busy loops, and sums in
+    several threads end in other digits."""
     os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
 
 
 def exit_code(app: typer.Typer, argv: list[str]) -> int:
-    """Run a command and return its exit code, after one line on standard error if it failed."""
-    with stoppable(), _printable_output():
-        _escape_letters()
-        return _run(app, argv)
+    """Run a command and return its exit code, after one line on standard error if it
+    failed."""
+    with stoppable(), printable_output():
+        escape_letters()
+        with collected_notes() as notes:
+            code = run(app, argv, notes)
+        if not code:
+            for text in notes.values():
+                report(f"note: {text}")
+        return code
 
 
-class _PrintableStream:
+class PrintableStream:
     """A stream of text, all of it `printable`."""
 
     def __init__(self, stream):
@@ -108,151 +136,137 @@ class _PrintableStream:
 
 
 @contextlib.contextmanager
-def _printable_output() -> Iterator[None]:
+def printable_output() -> Iterator[None]:
     """Make all that is printed `printable`, whatever files hold and are called."""
-    before = sys.stdout
-    sys.stdout = before and _PrintableStream(before)
+    stdout = sys.stdout
+    if stdout is not None:
+        sys.stdout = PrintableStream(stdout)
     try:
         yield
     finally:
-        sys.stdout = before
-
-
-def _run(app: typer.Typer, argv: list[str]) -> int:
-    with _notes() as notes:
-        code = _run_noting(app, argv, notes)
-    if not code:
-        for text in notes.values():
-            report(f"note: {text}")
-    return code
+        sys.stdout = stdout
 
 
 @contextlib.contextmanager
-def _notes():
-    """Collect the notes of a command: the first of each kind, by its text before its first number."""
+def collected_notes() -> Iterator[dict[str, str]]:
+    """Collect the notes of a command: the first of each kind, by its text before its
+    first number."""
     notes: dict[str, str] = {}
     with warnings.catch_warnings():
         warnings.simplefilter("always", Note)
-        warnings.filterwarnings(
-            "always", category=UserWarning, module=r"rft\."
-        )  # its notes; it takes NumPy to load
-        others = warnings.showwarning
+        # Notes of rft are of a class of its own, which takes NumPy to load.
+        warnings.filterwarnings("always", category=UserWarning, module=r"rft\.")
+        show_others = warnings.showwarning
 
-        def show(message, category, *where, **options):
-            if (
-                issubclass(category, Note)
-                or category.__module__.partition(".")[0] == "rft"
-            ):
-                text = (
-                    spell_arguments(message.args[0], _option)
-                    if isinstance(message, Note)
-                    else str(message)
-                )
-                notes.setdefault(re.split(r"[\d.]+ ", text)[0], text)
+        def collect(message, category, *where, **options):
+            if issubclass(category, Note):
+                text = spell_arguments(message.args[0], option)
+            elif category.__module__.partition(".")[0] == "rft":
+                text = str(message)
             else:
-                others(message, category, *where, **options)
+                show_others(message, category, *where, **options)
+                return
+            kind = re.split(r"[\d.]+ ", text)[0]
+            notes.setdefault(kind, text)
 
-        warnings.showwarning = show
+        warnings.showwarning = collect
         yield notes
 
 
-def _run_noting(app: typer.Typer, argv: list[str], notes: dict[str, str]) -> int:
+def run(app: typer.Typer, argv: list[str], notes: dict[str, str]) -> int:
+    """Run a command and return its exit code. notes: collected meanwhile; the line of
+    an error ends with them."""
     try:
         code = app(args=argv, prog_name="geomech", standalone_mode=False)
-        if code == 130:  # an interrupt that typer caught
+        if code == INTERRUPTED:  # an interrupt that typer caught
             raise KeyboardInterrupt
         if sys.stdout:
             sys.stdout.flush()
         return code or 0
     except SystemExit as end:  # typer raises it for a closed pipe
-        return (
-            _pipe_closed() if isinstance(end.__context__, BrokenPipeError) else end.code
-        )
-    except (Stopped, KeyboardInterrupt) as stopped:
-        return _stopped(stopped, argv)
-    except typer.Abort as aborted:  # typer raises it for an interrupt, and for an EOFError, which is none
+        if isinstance(end.__context__, BrokenPipeError):
+            return pipe_closed()
+        return end.code
+    except (Stopped, KeyboardInterrupt) as stop:
+        return stopped(stop, argv)
+    except typer.Abort as aborted:
+        # typer raises it for an interrupt, and for an EOFError, which is none.
         if isinstance(aborted.__cause__, KeyboardInterrupt):
-            return _stopped(aborted.__cause__, argv)
+            return stopped(aborted.__cause__, argv)
         raise (aborted.__cause__ or aborted) from None
     except MemoryError:
         report(
-            "error: not enough memory: lower the grid, the phases or the number of amplitudes"
+            "error: not enough memory: lower the grid, the phases or the number of "
+            "amplitudes"
         )
     except BrokenPipeError:
-        return _pipe_closed()
+        return pipe_closed()
     except Exception as error:
-        text = (
-            line(error.format_message())
-            if hasattr(error, "format_message")
-            else _said(error)
-        )
-        if not isinstance(error, (ValueError, OSError, RuntimeError)) and not hasattr(
-            error, "format_message"
-        ):
+        text = error_text(error)
+        if text is None:
             raise
+        more = [*getattr(error, "__notes__", ()), *notes.values()]
+        report(f"error: {'; '.join([line(text, LONGEST), *more])}")
         if isinstance(error, OSError):
-            text = _system_error(error)
-        report(
-            "error: "
-            + "; ".join(
-                [line(text, LONGEST), *getattr(error, "__notes__", ()), *notes.values()]
-            )
-        )
-        if isinstance(error, OSError):
-            _discard(sys.stdout)
+            discard(sys.stdout)
     return 2
 
 
-OPTIONS = {  # what a reader of a command types where its name is not that of the argument
-    "tolerance": "--tol",
-    "at": "--slice",
-    "drawn": "--plot",
-    "longest": "--yes",
-    "geomech.register": "--plugin FILE.py",
-    "Study.ccf(pair=...)": "geomech ccf --pair",
-}
+def error_text(error: Exception) -> str | None:
+    """Return the text of an error of a user or of the system; None for a fault of the
+    program, which shows its traceback."""
+    if isinstance(error, OSError):
+        return system_error(error)
+    if hasattr(error, "format_message"):  # of typer
+        return line(error.format_message())
+    if isinstance(error, Refusal):
+        return error.as_line(option)
+    if isinstance(error, ValueError | RuntimeError):
+        return str(error)
+    return None
 
 
-def _said(error: Exception) -> str:
-    """Return the line of an error, with options for the arguments that it names."""
-    return error.as_line(_option) if isinstance(error, Refusal) else str(error)
+def option(argument: str) -> str:
+    """Return the option for an argument of Python."""
+    if argument in OPTIONS:
+        return OPTIONS[argument]
+    return f"--{argument.replace('_', '-')}"
 
 
-def _option(argument: str) -> str:
-    return OPTIONS.get(argument) or "--" + argument.replace("_", "-")
-
-
-def _system_error(error: OSError) -> str:
-    """Return the text of an error of the system, with its cure. Standard output, to which commands write, has no name."""
+def system_error(error: OSError) -> str:
+    """Return the text of an error of the system, with its cure. Standard output, to
+    which commands write, has no name."""
     if error.errno in (errno.EMFILE, errno.ENFILE):
         return (
             "too many files are open at once: raise the limit, as by 'ulimit -n 1024'"
         )
     *_, (frame, _) = traceback.walk_tb(error.__traceback__)
-    where = frame.f_globals["__name__"]
-    if error.filename is None and where.startswith(PRINTING):
-        return f"cannot write to standard output: {error.strerror}; make room, or send it elsewhere"
+    module = frame.f_globals["__name__"]
+    if error.filename is None and module.startswith(PRINTING):
+        return (
+            f"cannot write to standard output: {error.strerror}; make room, or send it "
+            "elsewhere"
+        )
     return str(error)
 
 
-def _stopped(by: BaseException, argv: list[str]) -> int:
-    """Report what is stored, as the notes of ``by`` say, and the command that resumes; return the exit code."""
-    stored, command = (
-        "; ".join(getattr(by, "__notes__", ())),
-        shlex.join(["geomech", *argv]),
-    )
-    text = (
-        f"{stored}: {command}"
-        if stored
-        else f"nothing is kept; the same command starts anew: {command}"
-    )
-    report(f"error: stopped by {getattr(by, 'name', 'SIGINT')}: {text}")
-    return getattr(by, "code", 130)
+def stopped(stop: BaseException, argv: list[str]) -> int:
+    """Report what is stored, as the notes of ``stop`` say, and the command that
+    resumes; return the exit code."""
+    command = shlex.join(["geomech", *argv])
+    stored = "; ".join(getattr(stop, "__notes__", ()))
+    if stored:
+        text = f"{stored}: {command}"
+    else:
+        text = f"nothing is kept; the same command starts anew: {command}"
+    report(f"error: stopped by {getattr(stop, 'name', 'SIGINT')}: {text}")
+    return getattr(stop, "code", INTERRUPTED)
 
 
-def _pipe_closed() -> int:
-    """Return success where the reader left early: `geomech scenes | head -1`. Files are written by then."""
-    _discard(sys.stdout)
+def pipe_closed() -> int:
+    """Return success where the reader left early: `geomech scenes | head -1`. Files are
+    written by then."""
+    discard(sys.stdout)
     return 0
 
 
@@ -267,23 +281,26 @@ def report(text: str) -> None:
     try:
         print(printable(" ".join(text.split())), file=sys.stderr, flush=True)
     except OSError:
-        _discard(sys.stderr)
+        discard(sys.stderr)
 
 
-def _discard(stream) -> None:
-    """Redirect a stream that cannot be written to, so that Python does not complain of it at the end."""
+def discard(stream) -> None:
+    """Redirect a stream that cannot be written to, so that Python does not complain of
+    it at its end."""
     with contextlib.suppress(AttributeError, OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
-def _escape_letters() -> None:
-    """Escape letters that a terminal does not have, and silence matplotlib about its folders: no command fails for the sake
-    of its messages."""
+def escape_letters() -> None:
+    """Escape letters that a terminal does not have, and silence matplotlib about its
+    folders: no command fails for the sake of its messages."""
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(AttributeError, ValueError):
             stream.reconfigure(errors="backslashreplace")
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     try:
         Path.home()
-    except RuntimeError:  # there is none: matplotlib takes a temporary folder if MPLCONFIGDIR cannot be one
+    except RuntimeError:
+        # Without a home matplotlib takes a temporary folder if MPLCONFIGDIR cannot be
+        # one.
         os.environ.setdefault("MPLCONFIGDIR", os.devnull)

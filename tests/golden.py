@@ -38,6 +38,7 @@ from scipy.spatial.transform import Rotation
 
 import geomech
 import rft
+from geomech import pipeline
 from geomech.run import cost
 from geomech.systems.capabilities import solver_of
 from rft.balance import backend
@@ -386,7 +387,7 @@ def costs():
         frozen.place(),
     ):
         patch.setattr(
-            cost,
+            pipeline,
             "decide",
             lambda asked, judge: told.append(asked) or asked.check("", False),
         )

@@ -24,8 +24,8 @@ from tabled import tabled_json
 from test_hard_cases import GLASS, apart
 
 from geomech import scenes
-from geomech.describe.explain import explained
-from geomech.describe.system import described
+from geomech.describe.scene import description
+from geomech.describe.system import system_lines
 from geomech.gaits import Ellipse
 from geomech.systems import solver
 from rft import (
@@ -315,13 +315,13 @@ def test_what_stays_with_numpy_and_why():
     scene = scenes.load("three-link-glass")
     swimmer = scene.system
     line = lambda s: next(
-        x for x in described(s) if x.startswith("back end: ")
+        x for x in system_lines(s) if x.startswith("back end: ")
     ).removeprefix("back end: ")
     assert line(swimmer).startswith("compiled code")
     assert line(swimmer).endswith(
         "commands take NumPy where there is little to compute"
     )
-    assert line(swimmer) in explained(scene)
+    assert line(swimmer) in description(scene)
     assert line(scene.with_numerics(backend="numba").system).startswith("compiled code")
     assert line(scene.with_numerics(backend="numpy").system) == "NumPy, as asked for"
     assert line(scene.with_numerics(loads="midpoint:20").system).startswith(
@@ -345,7 +345,7 @@ def test_no_numba(monkeypatch):
     with backend.preferring(""):
         assert not backend.compiles("auto", record(GLASS))
         assert backend.fastest() == "numpy"
-    assert "numba is not installed (pip install 'geomech[fast]')" in explained(
+    assert "numba is not installed (pip install 'geomech[fast]')" in description(
         scenes.load("three-link-glass")
     )
     with pytest.raises(ValueError, match=r"pip install 'geomech\[fast\]'"):

@@ -12,7 +12,7 @@ from registry import EFFECTS
 
 from geomech import scenes
 from geomech.core.errors import UnitWarning
-from geomech.describe.explain import explained
+from geomech.describe.scene import description
 from geomech.gaits import Circle, Ellipse, Sine
 from geomech.studies.available import default_tiers
 from geomech.studies.scene_tables import SceneTables
@@ -77,7 +77,7 @@ def test_effects_say_what_they_are(name):
     # Of a balance the body cut in pieces has its own rounding.
     np.testing.assert_allclose(run(at_its_limit(effect)), run(), atol=1e-7)
     assert np.abs(run(effect) - run()).max() > 1e-3
-    told = explained(SANDFISH.changed(effects=(effect,)))
+    told = description(SANDFISH.changed(effects=(effect,)))
     assert (
         f"; costs {effect.cost}; gone at {effect.limit}, order {effect.order}" in told
     )
@@ -183,7 +183,7 @@ kind = "end-caps"
         robot.cycle(phases=64).net[:2],
         0.35 * scenes.parse(bare).cycle(phases=64).net[:2],
     )
-    assert "radius 16 mm" in explained(robot)
+    assert "radius 16 mm" in description(robot)
     for radius in (0.13, 0.002):  # longer than a link, and below a fiftieth of it
         with pytest.warns(UnitWarning, match=f"{1e3 * radius:g} mm"):
             scenes.parse(text + f"radius_m = {radius}")
@@ -425,12 +425,12 @@ def test_every_sample_of_a_batch_has_its_own_parameters(name):
 
 
 def test_explain_names_effects_engine_and_losses():
-    told = explained(scenes.load("shovel-nosed-snake"))
+    told = description(scenes.load("shovel-nosed-snake"))
     assert "on:  skin-friction" in told
     assert "on:  end-caps" in told
     assert "engine: algebraic" in told
     assert "not available: CCF maps" in told
-    plain = explained(scenes.load("three-link-glass"))
+    plain = description(scenes.load("three-link-glass"))
     assert "off, not evaluated: " + ", ".join(KINDS) in plain
     assert "not available" not in plain
     assert (
@@ -522,8 +522,8 @@ def test_grain_inertia_takes_the_grains_own_pressure():
         )
         assert own.assumes(medium) == ""
     old = INERTIAL.format(f=1.0)
-    assert "assumes" not in explained(scenes.parse(old))
-    assert "assumes k = 2.5" in explained(
+    assert "assumes" not in description(scenes.parse(old))
+    assert "assumes k = 2.5" in description(
         scenes.parse(old.replace("0.3mm-loose", "0.3mm-surface"))
     )
     with pytest.raises(Refusal, match="k must be a number from 0.001 to 1000"):
@@ -564,8 +564,8 @@ def test_what_an_effect_breaks_is_refused_by_name(tier):
         Refusal, match="the effect grain-inertia, which is not rate-independent"
     ):
         SceneTables(inertial).poses(tier)
-    assert "; not rate-independent; costs" in explained(inertial)
-    assert "not available: connection, CCF" in explained(inertial)
+    assert "; not rate-independent; costs" in description(inertial)
+    assert "not available: connection, CCF" in description(inertial)
     np.testing.assert_allclose(
         SceneTables(inertial).poses("adapted"),
         SceneTables(inertial).poses("direct"),
@@ -643,7 +643,7 @@ def test_what_a_march_cannot_give_is_refused_by_name(name):
             match=f"with the effect {name}, which is not .*: .*, or drop the effect",
         ):
             asked()
-    told = explained(swimmer)
+    told = description(swimmer)
     assert f"engine: {engine(swimmer.system.effects)}" in told
     assert f"with {name} " in told
     assert (

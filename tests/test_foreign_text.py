@@ -13,7 +13,7 @@ from test_mjcf import SCENE as WALKER
 
 import geomech as package
 from geomech import notebook, scenes
-from geomech.describe.explain import explained
+from geomech.describe.scene import description
 from geomech.io import files, tables
 from geomech.io.tables.mat import ABOUT
 from geomech.run import progress
@@ -101,7 +101,7 @@ def test_attributes_of_a_table(kind, stored, geomech, tmp_path):
         code, out, err = geomech(*command)
         assert code == 0
         shown(out, err)
-    shown(explained(scenes.load(tmp_path / "s.toml")))
+    shown(description(scenes.load(tmp_path / "s.toml")))
 
 
 def text_variable(name, text):
@@ -245,7 +245,7 @@ def test_pages_of_a_notebook():
         repr(made),
         repr(found),
         repr(swept),
-        explained(made.scene),
+        description(made.scene),
     ):
         shown(text)
 

@@ -11,7 +11,7 @@ from registry import GROUND_EFFECTS, OUTLINES, STRESSES
 
 from figures import ground_effects
 from geomech import scenes
-from geomech.describe.explain import explained
+from geomech.describe.scene import description
 from rft.terradynamics.ground import GROUND_EFFECTS as KINDS
 from rft.terradynamics.ground import (
     Aeration,
@@ -317,7 +317,7 @@ def test_the_ground_takes_power_from_100_000_motions_with_all_effects(tension):
 
 def test_what_an_effect_assumes_is_told():
     scene = scenes.load("c-leg").changed(effects=(GrainInertia(strength=2.0),))
-    told = explained(scene)
+    told = description(scene)
     assert (
         "on:  grain-inertia (strength = 2.0, density = 638.0); not rate-independent"
         in told
@@ -327,7 +327,7 @@ def test_what_an_effect_assumes_is_told():
         and "lambda = 1" not in told
     )
     assert (
-        explained(scene.changed(effects=(GrainInertia(2.0, 700.0),))).count("assumes")
+        description(scene.changed(effects=(GrainInertia(2.0, 700.0),))).count("assumes")
         == 0
     )
     for kind in KINDS.values():

@@ -18,7 +18,7 @@ from tabled import of_json, tabled, tabled_json
 
 from geomech import cli
 from geomech.core.entry_points import installed_entries
-from geomech.describe.explain import explained
+from geomech.describe.scene import description
 from geomech.describe.system import notes
 from geomech.gaits import KINDS as GAITS
 from geomech.gaits import Circle, Gait, Sine
@@ -163,7 +163,7 @@ def test_a_law_of_traction_alone_takes_backbones_and_says_its_rule():
         fine.velocity(alpha, alphadot), exact.velocity(alpha, alphadot), atol=2e-3
     )
     assert fine.balance_size.evaluations == 24 * exact.balance_size.evaluations
-    assert "gauss:24" in explained(Scene(fine, Sine(elements=8), SMALL))
+    assert "gauss:24" in description(Scene(fine, Sine(elements=8), SMALL))
     assert fine.refined().solver.loads == "gauss:48"
     assert capability(fine, Recorded).about()["loads"] == "gauss:24"
     told_otherwise = fine.with_solver(Solver(loads="midpoint:10"))
@@ -322,7 +322,7 @@ def test_one_of_each_family_runs_everywhere_and_round_trips(name):
     anew = toml(scene.changed(text="", numerics=Numerics(grid=8, phases=32)))
     assert f'"{name}"' in anew
     assert toml(parse(anew)) == anew
-    assert name in explained(scene)
+    assert name in description(scene)
     study = SceneTables(scene)
     table = tabled(study.displacements([0.4, 0.7]))
     assert np.isfinite(table["direct"]).all()

@@ -22,7 +22,7 @@ import rft
 from figures import measured_gait
 from geomech import gaits, measured
 from geomech.core.errors import Note, UnitWarning
-from geomech.describe.explain import explained
+from geomech.describe.scene import description
 from geomech.geometry import connection
 from geomech.geometry.connection import Connection
 from geomech.geometry.curvature import ccf
@@ -64,7 +64,7 @@ NAMES = ("t", "alpha_1", "alpha_2", "x", "y", "heading")
 
 
 def save_field(path, fit):
-    write_netcdf(path, results.of_fit(fit))
+    write_netcdf(path, results.fit_result(fit))
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +100,7 @@ def true_net(f, velocity):
 
 def true_A(f, velocity, t, h=1e-5):
     """d xi / d alphadot at the mean gait."""
-    alpha, rate, e = f.known.loop.shape(t), f.known.loop.shape(t, 1), h * np.eye(2)
+    alpha, rate, e = f.taylor.loop.shape(t), f.taylor.loop.shape(t, 1), h * np.eye(2)
     return np.stack(
         [velocity(alpha, rate + x) - velocity(alpha, rate - x) for x in e], -1
     ) / (2 * h)
@@ -132,7 +132,7 @@ def test_half_of_the_intervals_of_one_half_miss(viscous, usual):
         measured.fit_log(usual.log, level=x, harmonics=5) for x in (0.95, 0.5)
     )
     np.testing.assert_allclose(wide.displacement[0], narrow.displacement[0], rtol=1e-12)
-    assert wide.known.A.shape[-1] == 11
+    assert wide.taylor.A.shape[-1] == 11
     t = 2 * np.pi * np.arange(32) / 32
     found, off = narrow.along(t)
     assert 0.3 <= np.mean(np.abs(found - true_A(narrow, viscous, t)) <= off) <= 0.75
@@ -273,7 +273,10 @@ def test_where_A_jumps_its_error_is_told():
     found, told_off = f.along(t)
     off = np.abs(found - true_A(f, corner, t))[:, 2, 1]
     scatter = dataclasses.replace(
-        f, known=dataclasses.replace(f.known, standard_error=0 * f.known.standard_error)
+        f,
+        taylor=dataclasses.replace(
+            f.taylor, standard_error=0 * f.taylor.standard_error
+        ),
     ).along(t)[1]
     assert (
         np.mean(off <= told_off[:, 2, 1])
@@ -329,13 +332,13 @@ def test_every_entry_of_A_and_its_slope_is_the_truth_without_noise(viscous):
     )
     t = 2 * np.pi * np.arange(16) / 16
     assert np.abs(f.along(t)[0] - true_A(f, viscous, t)).max() < 2e-3  # of 0.3
-    n = f.known.loop.normals(t)[..., 0]
-    shape, far = f.known.loop.shape(t), 0.05 * n
+    n = f.taylor.loop.normals(t)[..., 0]
+    shape, far = f.taylor.loop.shape(t), 0.05 * n
     A = lambda alpha: np.stack([viscous(alpha, x) for x in np.eye(2)], -1)
     slope = (A(shape + far) - A(shape - far)) / 0.1
     assert (
         np.abs(
-            (f.known.connection(shape + far) - f.known.connection(shape - far)) / 0.1
+            (f.taylor.connection(shape + far) - f.taylor.connection(shape - far)) / 0.1
             - slope
         ).max()
         < 0.02
@@ -362,7 +365,7 @@ def test_as_many_harmonics_as_the_connection_asks_for_and_two_more(wave, kept):
         pose_noise=1e-3,
         seed=2,
     )
-    assert measured.fit_log(log_of(made)).known.A.shape[-1] == 2 * kept + 1
+    assert measured.fit_log(log_of(made)).taylor.A.shape[-1] == 2 * kept + 1
 
 
 def test_where_and_when_a_log_begins_does_not_matter(viscous):
@@ -373,7 +376,7 @@ def test_where_and_when_a_log_begins_does_not_matter(viscous):
     other = measured.fit_log(
         log_of(made._replace(pose=there, t=7 + 3 * made.t)), harmonics=4
     )
-    np.testing.assert_allclose(other.known.A, one.known.A, atol=1e-9)
+    np.testing.assert_allclose(other.taylor.A, one.taylor.A, atol=1e-9)
     np.testing.assert_allclose(other.measured, one.measured, atol=1e-9)
     assert math.isclose(other.frequency, one.frequency / 3)
 
@@ -384,9 +387,9 @@ def test_a_backward_log_has_the_same_connection(viscous):
         t=made.t[-1] - made.t[::-1], alpha=made.alpha[::-1], pose=made.pose[::-1]
     )
     one, other = (measured.fit_log(log_of(x), harmonics=4) for x in (made, back))
-    shape = one.known.loop.shape(np.arange(5.0))
+    shape = one.taylor.loop.shape(np.arange(5.0))
     np.testing.assert_allclose(
-        other.known.connection(shape), one.known.connection(shape), atol=0.02
+        other.taylor.connection(shape), one.taylor.connection(shape), atol=0.02
     )
     for k in (0, 2):
         np.testing.assert_allclose(
@@ -487,7 +490,7 @@ def test_sums_that_noise_makes_negative_are_solved_all_the_same():
 
 
 def test_half_of_what_the_second_order_changes_is_an_error(usual):
-    held = regression.sums(usual.known.loop, usual.samples, 3)
+    held = regression.sums(usual.taylor.loop, usual.samples, 3)
     found, errors = regression.solution(held)
     first = held.terms * 7
     plain = dataclasses.replace(
@@ -511,7 +514,7 @@ def test_noise_in_the_joints_draws_nothing_to_zero(viscous):
         fit={"harmonics": 4},
     )
     t = 2 * np.pi * np.arange(16) / 16
-    n = f.known.loop.normals(t)[..., 0]
+    n = f.taylor.loop.normals(t)[..., 0]
     found, true = (
         np.einsum("tij,tj->ti", A, n)[:, 2]
         for A in (f.along(t)[0], true_A(f, viscous, t))
@@ -537,7 +540,7 @@ def test_three_joints(tmp_path):
         centre=(0.1, 0.0, -0.2),
     )
     f = fitted(wave, gait, cycles=30, samples=20, seed=1, fit={"harmonics": 3})
-    alpha = f.known.loop.shape(np.arange(6.0))
+    alpha = f.taylor.loop.shape(np.arange(6.0))
     true = np.stack([wave(alpha, x) for x in np.eye(3)], -1)
     found, off = f.along(np.arange(6.0))
     assert np.mean(np.abs(found - true) <= off) > 0.85
@@ -550,20 +553,23 @@ def test_three_joints(tmp_path):
     np.testing.assert_allclose(
         system.run(*f.gait.cycle(128)).net, f.displacement[0], rtol=1e-12
     )
-    study, there = SceneTables(Scene(system, f.gait)), f.known.loop.shape(np.array(0.0))
+    study, there = (
+        SceneTables(Scene(system, f.gait)),
+        f.taylor.loop.shape(np.array(0.0)),
+    )
     plane = study.plane((0, 2), there)
     alpha = np.broadcast_to(there, (*plane.connection.A.shape[2:], 3)).copy()
     alpha[..., 0], alpha[..., 2] = np.meshgrid(*plane.connection.axes, indexing="ij")
     reached, A = (
-        f.known.reach(alpha) <= 1,
+        f.taylor.reach(alpha) <= 1,
         np.moveaxis(plane.connection.A, (0, 1), (-2, -1)),
     )
     np.testing.assert_allclose(
-        A[reached], f.known.connection(alpha[reached])[..., [0, 2]], rtol=1e-9
+        A[reached], f.taylor.connection(alpha[reached])[..., [0, 2]], rtol=1e-9
     )
     assert np.isnan(A[~reached]).all() and 0 < reached.sum() < reached.size / 4
     thin = dataclasses.replace(
-        f.tube, taylor=dataclasses.replace(f.known, spread=1e-9 * f.known.spread)
+        f.tube, taylor=dataclasses.replace(f.taylor, spread=1e-9 * f.taylor.spread)
     )
     with pytest.raises(
         ValueError,
@@ -649,7 +655,7 @@ def test_joints_that_follow_from_others_are_named(noise, rows, said):
         r"\d\.\d+", lambda x: f"{float(x[0]):.1g}", results.status(f)
     )  # noise moves the third digit
     assert re.match("fitted along the gait alone: " + said, found)
-    assert results.of_fit(f, False).attributes["status"] == results.status(f)
+    assert results.fit_result(f, False).attributes["status"] == results.status(f)
     if noise == 1e-3 and len(rows) == 1:
         kept = dataclasses.replace(log, alpha=log.alpha[:, :-1], joints=log.joints[:-1])
         assert results.status(measured.fit_log(kept, harmonics=2)) == "fitted"
@@ -788,7 +794,7 @@ def test_waves_are_a_fourier_series_and_its_derivatives():
 
 
 def test_the_ccf_near_the_gait_is_that_of_differences(usual):
-    known, h = usual.known, 1e-5
+    known, h = usual.taylor, 1e-5
     t = np.linspace(0.3, 6, 7)
     alpha = known.loop.shape(t) + 0.04 * known.loop.normals(t)[..., 0]
     d = [
@@ -822,7 +828,7 @@ def field(usual, tmp_path_factory):
     folder = tmp_path_factory.mktemp("measured")
     save_field(folder / "field.nc", usual)
     (folder / "mine.toml").write_text(
-        scene_text(results.of_fit(usual), folder / "field.nc", folder / "mine.toml")
+        scene_text(results.fit_result(usual), folder / "field.nc", folder / "mine.toml")
     )
     return folder
 
@@ -837,7 +843,7 @@ def test_a_field_is_read_back_as_a_system(usual, field):
     ).sum() == file.A.notnull().sum()
     t = np.arange(4.0)
     np.testing.assert_allclose(
-        usual.known.connection_error(usual.known.loop.shape(t)),
+        usual.taylor.connection_error(usual.taylor.loop.shape(t)),
         usual.along(t)[1],
         rtol=1e-6,
     )
@@ -877,22 +883,22 @@ def test_what_the_data_do_not_reach_is_refused(field):
     tube = study.fitted
     shapes = np.stack(np.meshgrid(*tube.axes, indexing="ij"), -1)
     np.testing.assert_array_equal(np.isnan(tube.A[0, 0]), tube.reach(shapes) > 1)
-    assert "known near a measured gait alone" in explained(scene)
+    assert "known near a measured gait alone" in description(scene)
 
 
 def test_the_reach_is_that_of_the_data(usual):
     """Deviations of 0.05 rad in both joints, of which 2.5 standard deviations count."""
     t = np.linspace(0, 6, 9)
-    n = usual.known.loop.normals(t)[..., 0]
+    n = usual.taylor.loop.normals(t)[..., 0]
     for side in (-0.125, 0.125):
         np.testing.assert_allclose(
-            usual.known.reach(usual.known.loop.shape(t) + side * n), 1, atol=0.25
+            usual.taylor.reach(usual.taylor.loop.shape(t) + side * n), 1, atol=0.25
         )
-    assert np.abs(usual.known.reach(usual.known.loop.shape(t))).max() < 1e-9
+    assert np.abs(usual.taylor.reach(usual.taylor.loop.shape(t))).max() < 1e-9
     near = measured.fit_log(usual.log, limits=0.03, harmonics=4)
     np.testing.assert_allclose(
-        near.known.reach(
-            near.known.loop.shape(t) + 0.03 * near.known.loop.normals(t)[..., 0]
+        near.taylor.reach(
+            near.taylor.loop.shape(t) + 0.03 * near.taylor.loop.normals(t)[..., 0]
         ),
         1,
     )
@@ -979,7 +985,7 @@ def test_what_an_older_file_does_not_have_is_told_all_the_same(field, tmp_path):
 
 def test_lengths_and_signs_of_a_field(usual, short, field, tmp_path):
     minus = Connection.load(field / "field.nc", sign="-")
-    alpha = usual.known.loop.shape(np.arange(3.0))
+    alpha = usual.taylor.loop.shape(np.arange(3.0))
     np.testing.assert_array_equal(minus(alpha), -usual.tube(alpha))
     two = Table(field / "field.nc", body_length=2.0)
     cycle = usual.gait.cycle(64)
@@ -1007,7 +1013,7 @@ def test_a_tube_between_the_points_of_its_grid_is_looked_up_all_the_same(
     assert np.isnan(study.fitted.A).all()
     np.testing.assert_allclose(study.poses("direct"), thin.displacement[0], rtol=1e-9)
     assert (
-        single(study.scene.system, thin.known.loop.shape(np.array(1.0)), [1.0, 0.0])[
+        single(study.scene.system, thin.taylor.loop.shape(np.array(1.0)), [1.0, 0.0])[
             "residual"
         ]
         is None
@@ -1062,12 +1068,12 @@ def test_cycles_that_do_not_vary_tell_the_displacement_and_no_more(viscous, tmp_
     net, off = f.displacement
     assert (np.abs(net - true_net(f, viscous)) <= off).all() and off.max() < 2e-3
     t = np.arange(6.0)
-    n = f.known.loop.normals(t)[..., 0]
+    n = f.taylor.loop.normals(t)[..., 0]
     assert (
         np.linalg.norm(np.einsum("tij,tj->ti", f.along(t)[1], np.abs(n)), axis=1).min()
         > 0.05
     )  # not known
-    slopes = np.abs(f.known.errors[:, :, :, 1]).max((1, 2, 3))
+    slopes = np.abs(f.taylor.errors[:, :, :, 1]).max((1, 2, 3))
     assert (slopes > 0).sum() == 6  # of three components, across the gait and along it
     save_field(tmp_path / "a.nc", f)
     np.testing.assert_allclose(
@@ -1107,7 +1113,7 @@ def test_cycles_that_differ_in_size_alone_tell_the_slope_along_the_gait(
         and off.max() < 4e-3
     )
     alpha, alphadot = f.gait.cycle(12, 1.1)
-    found = np.einsum("tij,tj->ti", f.known.connection(alpha), alphadot)
+    found = np.einsum("tij,tj->ti", f.taylor.connection(alpha), alphadot)
     at_the_gait = np.einsum(
         "tij,tj->ti", f.along(2 * np.pi * np.arange(12) / 12)[0], alphadot
     )
@@ -1300,12 +1306,12 @@ def test_columns_in_any_order_and_unit_tell_the_same(short, tmp_path):
     other = measured.fit_log(
         path, columns=["clock", "q1", "q2", "x", "y", "psi"], degrees=True, harmonics=3
     )
-    np.testing.assert_allclose(other.known.A, one.known.A, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(other.taylor.A, one.taylor.A, rtol=1e-6, atol=1e-9)
     names = ("time", "joint1_deg", "joint2_deg", "x", "y", "theta")
     path = written(tmp_path / "c.csv", short, names, changed(slice(1, 3), np.degrees))
     with pytest.warns(Note, match="theta is taken to be in rad"):
         third = measured.fit_log(path, harmonics=3)
-    np.testing.assert_allclose(third.known.A, one.known.A, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(third.taylor.A, one.taylor.A, rtol=1e-6, atol=1e-9)
     with pytest.warns(UnitWarning, match="drop degrees"):
         measured.read(tmp_path / "a.csv", degrees=True)
 
@@ -1406,7 +1412,7 @@ def test_what_is_no_time_makes_no_frequency(name, short, tmp_path):
     f = measured.fit_log(path, columns=(name, *NAMES[1:]))
     assert f.gait.frequency is None and math.isclose(f.frequency, 1 / 400, rel_tol=0.02)
     assert "frequency" not in scene_text(
-        results.of_fit(f, False), tmp_path / "a.nc", tmp_path / "a.toml"
+        results.fit_result(f, False), tmp_path / "a.nc", tmp_path / "a.toml"
     )
 
 

@@ -18,7 +18,7 @@ from test_intrude import outcome, refused
 import geomech.scenes as scenes
 from figures import meshes
 from geomech import plots
-from geomech.describe.explain import explained
+from geomech.describe.scene import description
 from geomech.scenes import MeshScene
 from geomech.studies.intrusion import answer
 from rft.core.refusal import Refusal
@@ -674,7 +674,7 @@ def test_figure_of_meshes(tmp_path):
 
 
 def test_explain_tells_effects_and_what_they_assume():
-    told = explained(scenes.parse(MADE))
+    told = description(scenes.parse(MADE))
     assert (
         "Sphere (radius = 0.02) of 320 triangles" in told
         and "on:  slope (angle = 0.174" in told
@@ -683,7 +683,7 @@ def test_explain_tells_effects_and_what_they_assume():
     assert "off, not evaluated: aeration, disturbed-ground, grain-inertia" in told
     assert (
         "off, not evaluated: aeration, disturbed-ground, grain-inertia, slope"
-        in explained(scenes.load("c-leg"))
+        in description(scenes.load("c-leg"))
     )
 
 

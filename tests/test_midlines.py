@@ -569,7 +569,7 @@ def test_contrasts_that_are_one_thing_seen_often_are_weak_evidence(copies, least
 def test_noise_that_is_alike_from_frame_to_frame_is_found(noisy):
     """Noise of standard deviation 0.01 whose neighbours in time are correlated by 0.6."""
     fresh = np.random.default_rng(0).normal(size=noisy.points.shape)
-    noise = 0.01 * smooth._alike(fresh, 0.6)
+    noise = 0.01 * smooth._ar1_filtered(fresh, 0.6)
     f = fit.fit_midlines(noisy._replace(points=noisy.exact + noise).trial())
     assert f.curve.alike == pytest.approx(
         0.6, abs=0.03
@@ -1493,7 +1493,7 @@ def test_what_closes_the_gap_is_told_in_the_units_of_scenes(fitted, unit, value,
     comparison = predicted.Comparison(
         None, values, values / 10, values, values / 10, each, (closing,)
     )
-    result = results.of_trial(fitted, comparison)
+    result = results.trial_result(fitted, comparison)
     told = trials.closing_words(result, "gamma0")
     assert re.match(
         f"gamma0 = {said}".replace("0.250", "0.25").replace("+", "[+]"), told
@@ -1510,14 +1510,14 @@ def test_measured_and_predicted_agree_within_both_of_their_errors(fitted, off):
     comparison = predicted.Comparison(
         None, values, predicted=values + off, per_cycle=each, closing=(), **errors
     )
-    result = results.of_trial(fitted, comparison)
+    result = results.trial_result(fitted, comparison)
     np.testing.assert_allclose(result["apart"].values, abs(off) / 0.05)
     said = "agree" if abs(off) < 0.05 else "differ"
     assert f"measured and predicted {said}: speed, stride, heading" in str(result)
 
 
 def test_a_trial_is_told_in_lines(fitted):
-    result = results.of_trial(fitted)
+    result = results.trial_result(fitted)
     first, head, *_ = show.lines(result)
     assert first == "synthetic: 4 full cycles of 30 points"
     assert head == f"head: {fitted.head}"
@@ -1530,7 +1530,7 @@ def test_a_trial_is_told_in_lines(fitted):
     length = fitted.value("body_length")[0]
     assert noise == pytest.approx(fitted.curve.noise / length)
     short = dataclasses.replace(fitted, used=fitted.used[:3], level=0.9)
-    told = str(results.of_trial(short))
+    told = str(results.trial_result(short))
     assert told.startswith(
         "synthetic: 3 full cycles of 30 points; 1 with gaps left out"
     )
@@ -1558,7 +1558,7 @@ def test_a_trial_is_told_in_lines(fitted):
 
 
 def test_the_mean_cycle_and_the_times_of_cycles_are_those_of_the_curve(fitted):
-    result, cycles = results.of_trial(fitted), fitted.cycles(fitted.curve)
+    result, cycles = results.trial_result(fitted), fitted.cycles(fitted.curve)
     headings = np.unwrap(np.angle(cycles.tangent), axis=-1)
     headings -= headings.mean((1, 2), keepdims=True)
     np.testing.assert_allclose(result["mean_cycle"].values, headings.mean(0), atol=1e-9)

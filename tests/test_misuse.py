@@ -16,7 +16,7 @@ from tabled import of_json, tabled
 import geomech as geomech_package
 from geomech import scenes
 from geomech.core.errors import UnitWarning, VelocityWarning
-from geomech.describe.explain import explained
+from geomech.describe.scene import description
 from geomech.gaits import Circle, Ellipse, Sine
 from geomech.geometry import connection, curvature
 from geomech.geometry.stretch import stretch
@@ -368,9 +368,9 @@ def test_explain_names_the_tiers_that_are_lost_and_why():
     ))  # fmt: skip
     assert (
         "tiers: area, adapted, path, direct; by name: harmonic"
-        == explained(three).splitlines()[-1]
+        == description(three).splitlines()[-1]
     )
-    fish = explained(scenes.load("sandfish-loose")).splitlines()
+    fish = description(scenes.load("sandfish-loose")).splitlines()
     assert "tiers: adapted, direct; by name: area, path" in fish
     assert (
         "not available: harmonic tier: they take 2 to 5 joints, this body has 99"
@@ -379,14 +379,14 @@ def test_explain_names_the_tiers_that_are_lost_and_why():
     two = PLAIN.replace('kind = "chain"', 'kind = "chain"\nlengths = [1, 1]').replace(
         '"circle"', '"wave"\njoints = 1'
     )
-    one = explained(scenes.parse(two)).splitlines()
+    one = description(scenes.parse(two)).splitlines()
     assert "not available: CCF maps: a loop of one joint encloses no area" in one
     assert (
         "not available: area tier: they take 2 joints and more, this body has 1" in one
     )
     assert (
         "not available: area and harmonic tiers: the field has singular shapes"
-        in explained(scenes.load("no-slip-snake"))
+        in description(scenes.load("no-slip-snake"))
     )
 
 

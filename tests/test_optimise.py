@@ -25,6 +25,7 @@ from geomech.optimisation.gain import Gained
 from geomech.optimisation.limiting import limiting
 from geomech.optimisation.loops import Loops
 from geomech.optimisation.objectives import Objective
+from geomech.optimisation.optimum import Optimum
 from geomech.optimisation.problem import Enough, Problem
 from geomech.optimisation.search import _Search
 from geomech.optimisation.stroke import Stroke
@@ -582,7 +583,7 @@ def test_three_joints_and_gaits_that_must_be_run_as_a_whole():
         Numerics(phases=64),
     )
     assert build_request(past, "efficiency").degree == 1.0
-    assert build_request(past, "displacement").by_runs
+    assert build_request(past, "displacement").uses_runs
 
 
 def test_a_gait_drawn_together_is_kept_clear_of_singular_shapes(monkeypatch):
@@ -1327,13 +1328,26 @@ def test_an_evaluation_is_what_the_gait_does_by_itself(objective, pace):
     assert (found.value, found.error) == pytest.approx(
         (value, error_of_value), rel=1e-6
     )
-    assert (found.heading, found.time, found.limits) == (
-        pytest.approx(heading),
-        pytest.approx(time),
-        (*pace,)[:1],
-    )
+    assert (found.time, found.limits) == (pytest.approx(time), (*pace,)[:1])
+    assert found.displacement_error == pytest.approx([0.3 * error] * 2 + [heading])
     assert found.displacement == pytest.approx(net)
     assert [found.length, found.work] == [pytest.approx(length, rel=1e-6)] * 2
+
+
+@pytest.mark.parametrize(
+    ("body", "finer"),
+    [(ODD, ODD), (ConstantCurvature(elements=12), ConstantCurvature(elements=96))],
+)
+def test_the_displacement_of_an_optimum_has_its_error(body, finer):
+    """Against 16 times the phases and, of a bent body, 8 times the elements."""
+    gait = Ellipse(semi_axes=(1.2, 0.7), tilt=0.4, centre=(0.3, -0.1), amplitude=0.7)
+    scene = Scene(Swimmer(SAND, body), gait, Numerics(phases=32))
+    request = build_request(scene, "displacement")
+    best = evaluate_gait(request, gait)
+    optimum = Optimum(request, best, best, (), (), (), 1, 0.0)
+    exact = Swimmer(SAND, finer).run(*gait.cycle(2048)).net
+    for variable, value in zip(variables.displacement(optimum), exact):
+        assert abs(float(variable) - value) < variable.error < 2e-3, variable.name
 
 
 def test_undulations_are_sines_within_their_bounds():
@@ -1615,7 +1629,7 @@ def test_a_turn_may_be_off_by_its_error_where_cycles_are_not_those_of_the_search
 
     past = viscous(system=Swimmer(SAND, Chain(), (Transient(travel=0.1),)))
     framed = SceneTables(viscous()).in_frame("minimum-perturbation").scene
-    evaluation = types.SimpleNamespace(heading=0.3)
+    evaluation = types.SimpleNamespace(displacement_error=[0.0, 0.0, 0.3])
     slacks = [
         searching(build_request(scene, "displacement"))._slack(evaluation)
         for scene in (viscous(), past, framed)

@@ -14,7 +14,7 @@ from tabled import tabled, tabled_json
 import geomech as library
 from geomech import plots
 from geomech.core.errors import VelocityWarning
-from geomech.describe.explain import explained
+from geomech.describe.scene import description
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry.traits import Traits
 from geomech.io import tables
@@ -299,7 +299,7 @@ def test_five_members_and_functions_go_through_everything(system, tmp_path):
     plots.save(plots.displacement_figure({"circle": result}), tmp_path / "a.png")
     plots.save(plots.ccf_figure(study.curvature), tmp_path / "b.png")
     assert single(scene.system, [0.1, 0.2], [1.0, 0.0])["status"] == "exact"
-    assert explained(scene).startswith(
+    assert description(scene).startswith(
         f"scene: {getattr(system, '__name__', 'Cart')}, circle gait"
     )
     assert study.cost([0.3], study.tiers).balances > 0

@@ -20,7 +20,7 @@ ROOT = pathlib.Path(__file__).parents[1]
 # solver to take one thread, and by which back end. Environments for learning stand on sand, and
 # measured midlines are put into a medium.
 KNOW_MECHANICS = {
-    "__init__.py", "gym/hexapod.py", "describe/grains.py", "describe/scenes.py", "describe/system.py", "studies/stress.py",
+    "__init__.py", "gym/hexapod.py", "describe/builtin.py", "describe/grains.py", "describe/system.py", "studies/stress.py",
     "scenes/intruder.py", "scenes/intruding.py", "scenes/solid.py", "scenes/stress.py", "scenes/walker.py",
     "scenes/write.py", "studies/batch.py", "studies/calibration.py", "run/backend.py", "measured/midlines/predicted.py",
     "studies/stress_calibration.py", "studies/walking.py", "studies/grains.py", "studies/grain_swim.py",
@@ -205,7 +205,8 @@ def test_mutants_are_programs_that_differ():
 
 def test_a_command_that_describes_is_the_function_of_its_file():
     files = {p.stem for p in (ROOT / "geomech" / "describe").glob("*.py")}
-    assert files == {*describe.SUMMARIES, "__init__", "grains", "system"}
+    shared = {"__init__", "builtin", "grains", "scene", "system"}
+    assert files == {*describe.SUMMARIES, *shared}
 
 
 SPEAK_OF_OPTIONS = (

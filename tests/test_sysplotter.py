@@ -6,7 +6,7 @@ from scipy.io import loadmat
 from structs import cell, computed, save, struct
 
 import rft
-from geomech.describe.system import described
+from geomech.describe.system import system_lines
 from geomech.gaits import Circle
 from geomech.geometry import connection
 from geomech.geometry.connection import Connection
@@ -434,7 +434,7 @@ def test_a_struct_of_three_joints_is_read(tmp_path):
         table.stored.connection.A[:2], fitted.A[:2] / 4, rtol=1e-13
     )
     np.testing.assert_array_equal(table.stored.connection.A[2], fitted.A[2])
-    assert not [line for line in described(table) if "sysplotter's own" in line]
+    assert not [line for line in system_lines(table) if "sysplotter's own" in line]
 
 
 @pytest.mark.parametrize(
@@ -464,7 +464,7 @@ def test_a_connection_that_its_body_would_have_with_other_axes_is_noted(
 
 
 def test_explain_says_how_far_its_own_numbers_are_from_ours(tmp_path):
-    lines = described(Table(write(tmp_path / "s.mat")))
+    lines = system_lines(Table(write(tmp_path / "s.mat")))
     (line,) = [
         line
         for line in lines

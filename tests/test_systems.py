@@ -10,7 +10,7 @@ from registry import GAITS, SYSTEMS
 from tabled import tabled
 
 from geomech import scenes, symbolic
-from geomech.describe.explain import explained
+from geomech.describe.scene import description
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection, coordinates
 from geomech.geometry.connection import sign_changes
@@ -207,7 +207,7 @@ def test_files_and_words_say_what_is_singular(tmp_path):
             "nan, where the wheels' axles meet"
         )
         assert scenes.parse(data.attrs["scene_toml"]) == study.scene
-    told = explained(scenes.load("no-slip-snake"))
+    told = description(scenes.load("no-slip-snake"))
     assert (
         "tiers: adapted, path, direct\n" in told
         and "gaits that meet one are refused" in told

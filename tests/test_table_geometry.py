@@ -11,7 +11,7 @@ from scipy.io import loadmat, savemat
 
 import rft
 from geomech import plots, scenes
-from geomech.describe.system import described
+from geomech.describe.system import system_lines
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection, harmonics
 from geomech.geometry.coordinates import change_velocity
@@ -208,7 +208,7 @@ def test_a_scene_gives_a_table_its_body_and_medium(sources, tmp_path, monkeypatc
         scene = scenes.load(f"{name}.toml")
         assert scene.frame == frame and isinstance(scene.system.medium, rft.Viscous)
         assert scenes.parse(scenes.toml(scene)).system == scene.system
-        lines = "\n".join(described(scene.system))
+        lines = "\n".join(system_lines(scene.system))
         assert (
             "changes of shape cost the drag of viscous (ratio = 2.0) on chain ("
             in lines

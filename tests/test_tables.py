@@ -22,8 +22,8 @@ from tabled import of_json, tabled
 
 import rft
 from geomech import api, plots, scenes
-from geomech.describe.explain import explained
-from geomech.describe.system import described
+from geomech.describe.scene import description
+from geomech.describe.system import system_lines
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier
 from geomech.geometry import connection
 from geomech.geometry.connection import Connection
@@ -488,7 +488,7 @@ def test_what_is_even_in_alphadot_is_part_of_the_error(ending, tmp_path):
     assert study().even_part is None
     fields.save_connection(tmp_path / f"a{ending}", source)
     table = Scene(Table(tmp_path / f"a{ending}"), GAIT)
-    assert ("xi is not odd in alphadot" in explained(table)) == (ending == ".nc")
+    assert ("xi is not odd in alphadot" in description(table)) == (ending == ".nc")
     for gait in (GAIT, Circle(amplitude=1.2), Butterfly(amplitude=0.8)):
         amplitudes = gait.amplitude * np.array([0.3, 0.8, 1.1])
         poses, errors = estimate.direct(table, gait, amplitudes, 128)
@@ -562,7 +562,7 @@ def test_every_command_works_on_a_table_or_says_why_not(made, tmp_path, monkeypa
         code, out, err = geomech(*args)
         assert (code, out) == (2, "") and said in err and err.count("\n") == 1
     assert (tmp_path / "t" / "a.nc").read_bytes() == before
-    told = explained(scenes.load("t/t.toml"))
+    told = description(scenes.load("t/t.toml"))
     assert "fit leaves x" in told and "odd harmonics" in told and "frame link-1" in told
     assert [k.label for k in tiered.Settings(scenes.load("t/t.toml")).settings()] == [
         "direct: phases",
@@ -615,7 +615,7 @@ def test_lengths_that_a_file_does_not_tell_are_assumed_in_a_note(
         file = tmp_path / f"a.{ending}"
         bare = Table(file)
         told = [line for line in bare.assumed if "body_length" in line]
-        assert told == [LENGTHS] and LENGTHS in described(bare)
+        assert told == [LENGTHS] and LENGTHS in system_lines(bare)
         assert (length_unit(bare), bare.length) == ("BL", 1.0)
         assert (bare.stored.connection.unit, bare.stored.connection.length) == (
             "BL",
@@ -629,7 +629,7 @@ def test_lengths_that_a_file_does_not_tell_are_assumed_in_a_note(
             said = Table(file, body_length=length)
             assert not [
                 line for line in said.assumed if "body_length" in line
-            ] and LENGTHS not in described(said)
+            ] and LENGTHS not in system_lines(said)
             np.testing.assert_allclose(
                 said.stored.connection.A[0] * length,
                 bare.stored.connection.A[0],

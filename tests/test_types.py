@@ -15,7 +15,7 @@ from tabled import swept_table, tabled
 import geomech
 import rft
 from geomech import scenes
-from geomech.describe.explain import explained
+from geomech.describe.scene import description
 from geomech.gaits import KINDS, Centreline, Circle, Sine
 from geomech.geometry import connection, curvature, family, harmonics, reconstruct
 from geomech.geometry.field import Field
@@ -206,7 +206,7 @@ def geometries(value):
     yield "phases", lambda: area(curvature.ccf(fitted), Circle(), 0.5, value)
     yield "xi", lambda: reconstruct.turning(value)
     yield "pose", lambda: se2.exp(value)
-    yield "a scene", lambda: explained(value)
+    yield "a scene", lambda: description(value)
     for of in (
         scenes.toml,
         scenes.tables,

@@ -15,7 +15,7 @@ from tabled import of_json, of_swept
 from figures.walking_sensitivity import Sheet
 from geomech import films, plots, scenes
 from geomech.core.variables import Result
-from geomech.describe.explain import explained
+from geomech.describe.scene import description
 from geomech.io.results import from_dict
 from geomech.plots.walking import walk_stage
 from geomech.questions import walk as questions_walk
@@ -1205,12 +1205,12 @@ def test_walks_as_they_are_built_in_are_solved_and_account_for_their_energy(name
 
 
 def test_explain_tells_the_robot_its_engine_and_effects():
-    told = explained(scenes.load("sandbot"))
+    told = description(scenes.load("sandbot"))
     assert "sandbot: Rhex (mass = 2.3" in told and "engine: planar" in told
     assert "on:  aeration (air_speed" in told and told.endswith(
         "off, not evaluated: grain-inertia"
     )
-    assert "engine: mujoco" in explained(scenes.load("screws"))
+    assert "engine: mujoco" in description(scenes.load("screws"))
 
 
 def test_axes_of_a_sweep_have_units():

@@ -8,10 +8,10 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from geomech.core.variables import COMPONENTS
 from rft.core.premise import negation
 from rft.core.refusal import formatted
 
-ROWS = ("x", "y", "theta")
 WIDTH = 80  # characters of a line on a small screen
 
 
@@ -45,8 +45,10 @@ def grid(axes: Sequence[np.ndarray], names: Sequence[str] = ()) -> str:
     ranges = [f"{a[0]:.4g} to {a[-1]:.4g}" for a in axes]
     names = names or [f"alpha_{k + 1}" for k in range(len(axes))]
     if len(axes) > 1 and len(set(ranges)) == 1:
-        link = "and" if len(names) == 2 else "to"
-        return f"{shape} shapes, {names[0]} {link} {names[-1]} from {ranges[0]} rad"
+        all_names = f"{names[0]} to {names[-1]}"
+        if len(names) == 2:
+            all_names = f"{names[0]} and {names[-1]}"
+        return f"{shape} shapes, {all_names} from {ranges[0]} rad"
     text = ", ".join(f"{name} from {x}" for name, x in zip(names, ranges))
     return f"{shape} shapes, {text} rad"
 
@@ -66,7 +68,7 @@ def span(values) -> str:
 
 def spans(values) -> str:
     """Return `span` of each of x, y and theta, on the first axis."""
-    return ", ".join(f"{row} {span(v)}" for row, v in zip(ROWS, values))
+    return ", ".join(f"{row} {span(v)}" for row, v in zip(COMPONENTS, values))
 
 
 def masked(values) -> str:
@@ -83,16 +85,16 @@ def fit_residual(residual, speed) -> str:
     if np.isnan(residual).all():
         return "fit residual unknown"
     parts = []
-    for name, r, s in zip(ROWS, residual, speed):
+    for name, r, s in zip(COMPONENTS, residual, speed):
         relative = np.sqrt(np.nanmean(r**2) / max(np.nanmean(s**2), 1e-300))
-        parts.append(f"{name} {_percent(relative)}")
+        parts.append(f"{name} {percent(relative)}")
     return f"fit leaves {', '.join(parts)} of the rms of xi"
 
 
-def _percent(x: float) -> str:
+def percent(share: float) -> str:
     """Return a share in percent, to two digits; 0 where it is rounding."""
-    if x > 1e-8:
-        return f"{100 * x:.2g} %"
+    if share > 1e-8:
+        return f"{100 * share:.2g} %"
     return "0 %"
 
 

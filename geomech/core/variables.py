@@ -19,6 +19,8 @@ import numpy as np
 from geomech.core.face import implementation
 
 Unit = str | tuple[str, ...]
+COMPONENTS = ("x", "y", "theta")  # of a velocity in the body frame
+POSE = ("x", "y", "heading")  # of a displacement
 ARRAYS = ("values", "error", "spread")  # of a variable, all of one shape
 
 
@@ -196,8 +198,8 @@ class Result(Mapping[str, Variable]):
 
     def without(self, *names: str) -> Result:
         """Return the result without these variables."""
-        kept = [v for v in self.variables if v.name not in names]
-        return replace(self, variables=tuple(kept))
+        others = [v for v in self.variables if v.name not in names]
+        return replace(self, variables=tuple(others))
 
     def at(self, **places: Any) -> Result:
         """Return the result at values of coordinates, such as tier="direct", without
@@ -215,8 +217,8 @@ class Result(Mapping[str, Variable]):
         """Return the result with more variables, which take the place of others of the
         same names."""
         names = {v.name for v in more}
-        kept = [v for v in self.variables if v.name not in names]
-        return replace(self, variables=(*kept, *more))
+        others = [v for v in self.variables if v.name not in names]
+        return replace(self, variables=(*others, *more))
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data in the layout of `xarray.Dataset.from_dict`; nan is

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from geomech.core.summary import effect_lines, part
 from rft.core.refusal import in_line
@@ -13,28 +13,35 @@ if TYPE_CHECKING:
     from geomech.scenes.walker import WalkerScene
 
 
-def described(scene: Intruding | WalkerScene) -> list[str]:
-    """Return lines on the law, the body and its motion, or the robot, its clock and the engine, and which effects are on and
-    off."""
-    walks = hasattr(scene, "robot")
-    body, motion = (
-        (scene.robot, scene.gait) if walks else (scene.intruder, scene.motion)
-    )
-    body, moves, medium = (
-        part(type(x).__name__, x) for x in (body, motion, scene.medium)
-    )
-    lines = [f"gait: {moves}" if walks else f"motion: {moves}", f"medium: {medium}"]
-    lines += [f"engine: {scene.engine}"] if walks else []
-    known = (
-        sorted(kind for kind, effect in GROUND_EFFECTS.items() if effect.walks)
-        if walks
-        else GROUND_EFFECTS
-    )
-    off = [kind for kind in known if kind not in [e.kind for e in scene.effects]]
+def scene_lines(scene: Intruding | WalkerScene) -> list[str]:
+    """Return lines on the body and its motion, or the robot, its gait and its engine;
+    on the medium; and on the effects that are on and off."""
+    name = in_line(scene.name)
+    if hasattr(scene, "robot"):
+        lines = [
+            f"{name}: {named_part(scene.robot)}",
+            f"gait: {named_part(scene.gait)}",
+            f"medium: {named_part(scene.medium)}",
+            f"engine: {scene.engine}",
+        ]
+        possible = sorted(k for k, effect in GROUND_EFFECTS.items() if effect.walks)
+    else:
+        body = f"{named_part(scene.intruder)} of {scene.count:,} {scene.parts}"
+        lines = [
+            f"{name}: {body}",
+            f"motion: {named_part(scene.motion)}",
+            f"medium: {named_part(scene.medium)}",
+        ]
+        possible = [*GROUND_EFFECTS]
+    used = {effect.kind for effect in scene.effects}
+    off = [kind for kind in possible if kind not in used]
     return [
-        f"{in_line(scene.name)}: {body}"
-        + ("" if walks else f" of {scene.count:,} {scene.parts}"),
         *lines,
         *effect_lines(scene.effects),
-        "off, not evaluated: " + (", ".join(off) or "none"),
+        f"off, not evaluated: {', '.join(off) or 'none'}",
     ]
+
+
+def named_part(thing: Any) -> str:
+    """Return a part of a scene by the name of its class."""
+    return part(type(thing).__name__, thing)

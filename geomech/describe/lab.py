@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
-from geomech import terminal
+from geomech import pipeline, terminal
+from geomech.core.summary import wrapped
 from geomech.options import YesOption
 from geomech.questions.loading import load_scenes
 from geomech.questions.names import scene_names
 from geomech.questions.texts import parameters
+from rft.core.refusal import in_line
 
 if TYPE_CHECKING:
     from geomech.studies.charts import Chart
@@ -48,11 +50,9 @@ def lab(
     """Make a page to draw loops on the CCF and watch the swimmer. It is one file, which
     needs no network and nothing installed: map, swimmer, and displacement of a cycle by
     three tiers with their errors."""
-    from geomech import pipeline
-    from geomech.core.summary import wrapped
+    # The mechanics of scenes takes longer to load than the help of this command.
     from geomech.lab import check_format, opened, write
     from geomech.studies.lab import GALLERY, Lab
-    from rft.core.refusal import in_line
 
     if out is not None:
         check_format(out)
@@ -70,9 +70,7 @@ def lab(
 
 
 def lines(charts: list[Chart]) -> list[str]:
-    """Return a line a scene, and one for a family."""
-    from rft.core.refusal import in_line
-
+    """Return a line for each scene, and one for a family."""
     names = [in_line(chart.scene.name) for chart in charts]
     wide = max(map(len, names))
     found = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Annotated, Optional
 
 import typer
@@ -34,8 +35,6 @@ def reference(
 def keys(section: str | None, json_schema: bool) -> str:
     """Return all keys of scene files, those of one section, or a JSON Schema of whole
     files."""
-    import json
-
     from geomech.scenes.keys import text
     from geomech.scenes.schema import schema
 

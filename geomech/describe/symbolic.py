@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from geomech import terminal
+from geomech.core.variables import COMPONENTS
 from geomech.options import SceneArgument
 from geomech.questions.loading import load_scene
+from rft.core.refusal import located
 
 if TYPE_CHECKING:
     from geomech.scenes import Scene
-
-ROWS = ("x", "y", "theta")
 
 
 def symbolic(
@@ -26,8 +26,8 @@ def symbolic(
         bool, typer.Option(help="print the CCF of every two joints, too")
     ] = True,
 ):
-    """Print connection and CCF in closed form. Chains in a viscous or ideal fluid, afloat
-    and on wheels have one."""
+    """Print connection and CCF in closed form. Chains in a viscous or ideal fluid,
+    afloat and on wheels have one."""
     terminal.show(formulas(load_scene(name), ccf, latex))
 
 
@@ -37,7 +37,6 @@ def formulas(scene: Scene, ccf: bool = True, latex: bool = False) -> Iterator[st
     Refusal for a system without closed form."""
     from geomech import symbolic as closed_form
     from geomech.systems.framed import formula
-    from rft.core.refusal import located
 
     formatted = entries
     if latex:
@@ -59,7 +58,7 @@ def formulas(scene: Scene, ccf: bool = True, latex: bool = False) -> Iterator[st
 def entries(matrix: Any, name: str) -> str:
     """Return a line for each entry of a matrix; those of A by component and joint."""
     lines = []
-    for r, row in enumerate(ROWS):
+    for r, row in enumerate(COMPONENTS):
         for k in range(matrix.shape[1]):
             entry = f"{name}_{row}"
             if name == "A":

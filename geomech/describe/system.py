@@ -1,4 +1,5 @@
-"""A system in words: its parts with their numbers and cost, its engine, and notes on how it is computed."""
+"""A system in words: its parts with their numbers and cost, its engine, and notes on
+how it is computed."""
 
 from __future__ import annotations
 
@@ -16,137 +17,183 @@ from rft.core.premise import SHAPE_ALONE, negation
 from rft.core.refusal import formatted, in_line
 from rft.effects import EFFECTS, ENGINES
 from rft.effects import engine as engine_of
+from rft.effects.base import Effect
 from rft.formulas.quadrature import QUADRATURE
 from rft.laws import LAWS
 from rft.laws.records import is_compilable, record
 
-NO_PAST = "nothing remembers, places are alike, no mass"
+NO_PREMISE_BROKEN = "nothing remembers, places are alike, no mass"
 
 
-def described(system: System) -> list[str]:
+def system_lines(system: System) -> list[str]:
     """Return a system in lines, part by part; the first continues the scene's name."""
     if isinstance(system, Framed):
-        first, *rest = described(system.inner)
+        first, *rest = system_lines(system.inner)
         return [f"{first}, seen from its {NAME} frame", *rest]
     if isinstance(system, WrappedSystem):
-        return described(system.wrapped)
+        return system_lines(system.wrapped)
     if isinstance(system, Swimmer):
-        return _swimmer(system)
+        return swimmer_lines(system)
     if isinstance(system, Table):
-        return _table(system)
-    fields = dataclasses.fields(system) if dataclasses.is_dataclass(system) else ()
-    given = {f.name: getattr(system, f.name) for f in fields}
-    numbers = ", ".join(
-        f"{name} = {formatted(x)}" for name, x in given.items() if x is not None
-    )
-    return [f"{kind_of(system)} ({numbers})" if numbers else kind_of(system)]
+        return table_lines(system)
+    entries = []
+    if dataclasses.is_dataclass(system):
+        for field in dataclasses.fields(system):
+            value = getattr(system, field.name)
+            if value is not None:
+                entries.append(f"{field.name} = {formatted(value)}")
+    if not entries:
+        return [kind_of(system)]
+    return [f"{kind_of(system)} ({', '.join(entries)})"]
 
 
 def engine(system: System) -> str:
     """Return the name of a system's engine, its working, and the reason for it."""
     if isinstance(system, Framed):
         return engine(system.inner)
-    if isinstance(system, Swimmer):
-        name = engine_of(system.effects)
-        broken = [
-            (e.kind, e.breaks & SHAPE_ALONE)
-            for e in system.effects
-            if e.breaks & SHAPE_ALONE
-        ]
-        reasons = [
-            f"with {kind} the scene is {negation(premises)}"
-            for kind, premises in broken
-        ]
-        return f"{name} ({ENGINES[name]}): {'; '.join(reasons) or NO_PAST}"
     if isinstance(system, Table):
         return "algebraic (the velocity at every shape, looked up)"
-    return f"algebraic (the velocity at every shape, all shapes at once): {NO_PAST}"
+    if not isinstance(system, Swimmer):
+        return (
+            "algebraic (the velocity at every shape, all shapes at once): "
+            f"{NO_PREMISE_BROKEN}"
+        )
+    reasons = []
+    for effect in system.effects:
+        broken = effect.breaks & SHAPE_ALONE
+        if broken:
+            reasons.append(f"with {effect.kind} the scene is {negation(broken)}")
+    name = engine_of(system.effects)
+    return f"{name} ({ENGINES[name]}): {'; '.join(reasons) or NO_PREMISE_BROKEN}"
 
 
 def notes(system: System) -> tuple[str, ...]:
     """Return notes on how a system is computed that its user may not expect."""
     if isinstance(system, Framed):
         return notes(system.inner)
-    if (
-        not isinstance(system, Swimmer)
-        or system.closed
-        or system.solver.loads != "exact"
-    ):
+    if not isinstance(system, Swimmer):
+        return ()
+    if system.closed or system.solver.loads != "exact":
         return ()
     return (
-        f"the law {name_in(LAWS, system.medium)} has no closed form: its averages over an element are by quadrature "
-        f"({QUADRATURE}) in place of exact integrals, which takes some five times as long and, where drag is dry, is off "
-        "by 1 to 7 % of the displacement of three links, less of more; errors include it, and "
+        f"the law {name_in(LAWS, system.medium)} has no closed form: its averages over "
+        f"an element are by quadrature ({QUADRATURE}) in place of exact integrals, "
+        "which takes some five times as long and, where drag is dry, is off by 1 to 7 % "
+        "of the displacement of three links, less of more; errors include it, and "
         '[numerics] loads = "gauss:96" lowers it tenfold',
     )
 
 
-def _swimmer(system: Swimmer) -> list[str]:
-    parts = ((LAWS, system.medium), (BODIES, system.body))
-    medium, body = (summary.part(name_in(kinds, x), x) for kinds, x in parts)
-    lines = [f"{medium}, {body}", *notes(system)]
+def swimmer_lines(system: Swimmer) -> list[str]:
+    """Return medium and body, notes, the effects that are on and off, and the back
+    end."""
+    law = name_in(LAWS, system.medium)
+    lines = [medium_and_body(system, ", "), *notes(system)]
     for effect in system.effects:
-        cost = f"; costs {effect.cost}" if effect.cost else ""
-        limit = (
-            f"; gone at {effect.limit}, order {effect.order}" if effect.limit else ""
-        )
-        premises = negation(effect.breaks) or "keeps every premise"
-        lines.append(
-            f"on:  {summary.part(effect.kind, effect)}; {premises}{cost}{limit}"
-        )
-        if sizes := effect_sizes(effect, system.body):
-            lines.append(f"     {sizes}")
-        if assumed := effect.assumes(system.medium):
-            lines.append(f"     assumes {assumed}")
-    off = [name for name in EFFECTS if name not in [e.kind for e in system.effects]]
+        lines += effect_lines(effect, system)
+    used = {effect.kind for effect in system.effects}
+    off = [name for name in EFFECTS if name not in used]
     compilable = is_compilable(record(system.medium, system.solver.loads))
-    lines.append("off, not evaluated: " + (", ".join(off) or "none"))
     return [
         *lines,
-        f"back end: {system.solver.computed(compilable, name_in(LAWS, system.medium))}",
+        f"off, not evaluated: {', '.join(off) or 'none'}",
+        f"back end: {system.solver.computed(compilable, law)}",
     ]
 
 
-def _table(system: Table) -> list[str]:
-    held = system.stored
-    lines = [f"table ({in_line(system.file)}: {held.connection!r})"]
-    if system.tube is not None:
-        lines.append(
-            f"known near a measured gait alone; errors are those of {system.tube.taylor.level:.3g} of cases"
-        )
-    elif held.harmonics:
-        lines.append(
-            f"with the odd harmonics of xi in the direction of alphadot to {held.highest}: {held.harmonics!r}"
-        )
-    else:
-        lines.append(
-            "A alone: xi = A alphadot"
-            + ", and what the fit left is part of every error" * held.has_residual
-        )
-    if held.even is not None:
+def medium_and_body(swimmer: Swimmer, link: str) -> str:
+    """Return the medium and the body of a swimmer with their numbers.
+
+    link: stands between them."""
+    medium = summary.part(name_in(LAWS, swimmer.medium), swimmer.medium)
+    body = summary.part(name_in(BODIES, swimmer.body), swimmer.body)
+    return f"{medium}{link}{body}"
+
+
+def effect_lines(effect: Effect, system: Swimmer) -> list[str]:
+    """Return an effect with the premises that it breaks, its cost and its limit; its
+    sizes for this body; and its assumptions."""
+    premises = negation(effect.breaks) or "keeps every premise"
+    line = f"on:  {summary.part(effect.kind, effect)}; {premises}"
+    if effect.cost:
+        line = f"{line}; costs {effect.cost}"
+    if effect.limit:
+        line = f"{line}; gone at {effect.limit}, order {effect.order}"
+    lines = [line]
+    sizes = effect_sizes(effect, system.body)
+    if sizes:
+        lines.append(f"     {sizes}")
+    assumed = effect.assumes(system.medium)
+    if assumed:
+        lines.append(f"     assumes {assumed}")
+    return lines
+
+
+def table_lines(system: Table) -> list[str]:
+    """Return a table's file and arrays, what its errors include, and its
+    conventions."""
+    stored = system.stored
+    lines = [
+        f"table ({in_line(system.file)}: {stored.connection!r})",
+        field_line(system),
+    ]
+    if stored.even is not None:
         lines.append("xi is not odd in alphadot: what is even is part of every error")
-    if held.A_error is not None and system.tube is None:
+    if stored.A_error is not None and system.tube is None:
         lines.append("its file tells intervals of A: they are part of every error")
-    if not held.has_residual:
+    if not stored.has_residual:
         lines.append(
-            "the file does not tell what its fit left: errors are those of the grid alone"
+            "the file does not tell what its fit left: errors are those of the grid "
+            "alone"
         )
-    if held.computed is not None and (differences := compared(system.original)):
-        found = ", ".join(f"{name} {100 * x:.2g} %" for name, x in differences.items())
-        lines.append(
-            f"largest difference of sysplotter's own from ours, in the middle half of the grid: {found}"
-        )
+    if stored.computed is not None:
+        lines += comparison_lines(system)
     if system.swimmer:
-        parts = ((LAWS, system.swimmer.medium), (BODIES, system.swimmer.body))
-        medium, body = (summary.part(name_in(kinds, x), x) for kinds, x in parts)
-        lines.append(f"changes of shape cost the drag of {medium} on {body}")
-    own = system.original.frame
-    frame = held.frame if held.frame == own else f"{held.frame}, from {own} in the file"
-    lines.append(
-        f"stored as {SIGNS[held.sign]}, arrays as {held.order}, lengths in {held.unit}, frame {frame}"
-    )
+        parts = medium_and_body(system.swimmer, " on ")
+        lines.append(f"changes of shape cost the drag of {parts}")
+    frame = stored.frame
+    original_frame = system.original.frame
+    if frame != original_frame:
+        frame = f"{frame}, from {original_frame} in the file"
     return [
         *lines,
+        f"stored as {SIGNS[stored.sign]}, arrays as {stored.order}, lengths in "
+        f"{stored.unit}, frame {frame}",
         *system.assumed,
-        "its field has the grid of the file; [numerics] grid, extent and directions say nothing",
+        "its field has the grid of the file; [numerics] grid, extent and directions "
+        "say nothing",
+    ]
+
+
+def field_line(system: Table) -> str:
+    """Return what a table has besides A: a tube around a gait, harmonics, or
+    nothing."""
+    stored = system.stored
+    if system.tube is not None:
+        level = system.tube.taylor.level
+        return (
+            "known near a measured gait alone; errors are those of "
+            f"{level:.3g} of cases"
+        )
+    if stored.harmonics:
+        return (
+            "with the odd harmonics of xi in the direction of alphadot to "
+            f"{stored.highest}: {stored.harmonics!r}"
+        )
+    if stored.has_residual:
+        return "A alone: xi = A alphadot, and what the fit left is part of every error"
+    return "A alone: xi = A alphadot"
+
+
+def comparison_lines(system: Table) -> list[str]:
+    """Return how far the fields that sysplotter computed are from ours; [] where none
+    is compared."""
+    found = []
+    for name, difference in compared(system.original).items():
+        found.append(f"{name} {100 * difference:.2g} %")
+    if not found:
+        return []
+    return [
+        "largest difference of sysplotter's own from ours, in the middle half of the "
+        f"grid: {', '.join(found)}"
     ]

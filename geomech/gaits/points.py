@@ -100,7 +100,8 @@ class Points(Gait):
             warnings.warn(
                 f"[gait] points: the spline through {len(self.points)} shapes leaves"
                 f" the polygon through them by {100 * bulge:.0f} % of its size: if"
-                " straight sides are meant, take kind = 'polygon', else give more points",
+                " straight sides are meant, take kind = 'polygon', else give more"
+                " points",
                 Note,
                 stacklevel=4,
             )

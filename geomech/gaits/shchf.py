@@ -62,7 +62,10 @@ class Shchf(Gait):
         if self.sha256 and self.file is None:
             raise Refusal("sha256 is that of a file", instead="drop it")
         object.__setattr__(self, "file", self.file and str(self.file))
-        curve = self._read_file() if self.file else self._series()
+        if self.file:
+            curve = self._read_file()
+        else:
+            curve = self._series()
         object.__setattr__(self, "_curve", curve)
         super().__post_init__()
 

@@ -152,7 +152,9 @@ def cycle_images(
     def path(k):
         return samples.take(k, 1, mode="wrap")
 
-    moving = rate_size.argmax() if len(samples) else 0
+    moving = 0
+    if len(samples):
+        moving = rate_size.argmax()
     return _cycle_images(phases, *_symmetries(path, phases, 1, moving, traits))
 
 
@@ -200,7 +202,9 @@ def _symmetries(
         return shifted, ()
 
     # Where the halves are images of each other, one sign follows from the other.
-    signs = (-1.0, 1.0) if traits.halved and not shifted else (-1.0,)
+    signs = [-1.0]
+    if traits.halved and not shifted:
+        signs.append(1.0)
     for sign in signs:
         shapes = samples[..., joints - 1 :: -1]
         rates = -samples[..., : joints - 1 : -1]

@@ -263,7 +263,8 @@ class TaylorSeries:
         return self.factor * np.sqrt(variance + self.standard_error_at(t) ** 2)
 
     def along(self, t: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """Return A (T, 3, d) at phases t of the gait, and half widths of its interval."""
+        """Return A (T, 3, d) at phases t of the gait, and half widths of its
+        interval."""
         errors = series(self.errors[:, :, :, 0], t)
         variance = (errors**2).sum(-3) + self.standard_error_at(t) ** 2
         return series(self.A, t), self.factor * np.sqrt(variance)

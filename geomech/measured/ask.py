@@ -12,7 +12,7 @@ from geomech.measured.midlines import reader
 from geomech.measured.midlines.trial import Trial
 from rft.core.refusal import Refusal, formatted, line
 
-OF_LOGS = "degrees", "harmonics", "limits", "scene"
+OF_LOGS = ("degrees", "harmonics", "limits", "scene")
 OF_MIDLINES = (
     "medium",
     "effects",
@@ -25,11 +25,12 @@ OF_MIDLINES = (
     "individual",
     "mend",
 )
-WHAT = (
+HEADERS = (
     "give a CSV file with a header such as t,alpha_1,alpha_2,x,y,heading for joint "
     "angles, or t,point,x,y or t,x1,y1,x2,y2 for points along a body"
 )
-LOG, MIDLINES = "log", "midlines"
+LOG = "log"
+MIDLINES = "midlines"
 WORDS = {LOG: "a log of joint angles", MIDLINES: "midlines"}
 SCENE = (
     "give one cycle of the midlines to a scene whose [gait] has kind = 'centreline' "
@@ -54,7 +55,7 @@ def form_of(measured: str | Path | Log | Trial, options: Mapping[str, Any]) -> s
         refuse(measured.name, MIDLINES, of_logs)
         return MIDLINES
     file = Path(measured)
-    header = read_rows(file, reader.LARGEST_FILE, WHAT).header[1]
+    header = read_rows(file, reader.LARGEST_FILE, HEADERS).header[1]
     form = reader.kind_of(header)
     if not form and of_logs and of_midlines:
         raise Refusal(
@@ -66,8 +67,9 @@ def form_of(measured: str | Path | Log | Trial, options: Mapping[str, Any]) -> s
     if not form:
         form = MIDLINES if of_midlines else LOG
     wrong = of_logs if form == MIDLINES else of_midlines
-    refuse(file.name, form, wrong, f"by its header this is a file of {WORDS[form]}: "
-           f"{formatted(', '.join(header), 120)}")  # fmt: skip
+    columns = formatted(", ".join(header), 120)
+    because = f"by its header this is a file of {WORDS[form]}: {columns}"
+    refuse(file.name, form, wrong, because)
     return form
 
 

@@ -86,7 +86,9 @@ def _check_gaps(log: Log, repeat: float) -> None:
     if count == 0:
         return
     k = int(gaps.argmax())
-    which = "its one gap" if count == 1 else f"the longest of {count} gaps"
+    which = "its one gap"
+    if count > 1:
+        which = f"the longest of {count} gaps"
     raise log.wrong(
         f"no rows for {gaps[k]:.3g} after this one (t = {log.t[k]:.6g}),"
         f" {gaps[k] / repeat:.2g} of a cycle, {which}",
@@ -253,7 +255,9 @@ def check_one_gait(
     low = np.cumsum(order)[:-1] / k
     high = (order.sum() - np.cumsum(order)[:-1]) / (count - k)
     between = k * (count - k) / count * (high - low) ** 2
-    best = int(between[2:-2].argmax()) + 2 if count > 5 else 0
+    best = 0
+    if count > 5:
+        best = int(between[2:-2].argmax()) + 2
     kind = score > (order[best] + order[best + 1]) / 2
     is_in_order = (kind[1:] != kind[:-1]).sum() == 1
     share = BETWEEN_GAITS_IN_ORDER if is_in_order else BETWEEN_GAITS

@@ -68,7 +68,7 @@ class Fitted:
     """
 
     log: Log
-    known: TaylorSeries
+    taylor: TaylorSeries
     times: np.ndarray
     measured: np.ndarray
     predicted: np.ndarray
@@ -90,7 +90,7 @@ class Fitted:
     @cached_property
     def gait(self) -> Fourier:
         """Mean gait, of amplitude 1, with the log's frequency if its t is a time."""
-        c = self.known.loop.coefficients
+        c = self.taylor.loop.coefficients
         return Fourier(
             cos=tuple(map(tuple, c[:, 1::2].tolist())),
             sin=tuple(map(tuple, c[:, 2::2].tolist())),
@@ -102,37 +102,37 @@ class Fitted:
     def displacement(self) -> tuple[np.ndarray, np.ndarray]:
         """Net pose (3,) of the mean gait by the connection, and half width of its
         interval (3,)."""
-        net, alpha, alphadot = _net(self.known)
-        return net, self.known.error(alpha, alphadot)
+        net, alpha, alphadot = _net(self.taylor)
+        return net, self.taylor.error(alpha, alphadot)
 
     @cached_property
     def mean(self) -> tuple[np.ndarray, np.ndarray]:
         """Mean net pose (3,) of the logged cycles, and half width of its interval
         (3,)."""
-        return mean_pose(self.measured, self.known.level)
+        return mean_pose(self.measured, self.taylor.level)
 
     @cached_property
     def tube(self) -> Tube:
         """Connection near the mean gait, with a grid for pictures and files."""
         # Three points within the least width that the data reach.
-        width = float(np.sqrt(np.einsum("iip->pi", self.known.spread).min()))
-        extent = max(np.ptp(axis) for axis in covering_grid(self.known, 2))
+        width = float(np.sqrt(np.einsum("iip->pi", self.taylor.spread).min()))
+        extent = max(np.ptp(axis) for axis in covering_grid(self.taylor, 2))
         joints = len(self.log.joints)
         most = min(MOST_POINTS, int(MOST_SHAPES ** (1 / joints)))
         points = int(np.clip(np.ceil(3 * extent / width), min(31, most), most))
-        axes = covering_grid(self.known, points)
-        return tube(self.known, axes, self.residual, self.unit, body_size(self))
+        axes = covering_grid(self.taylor, points)
+        return tube(self.taylor, axes, self.residual, self.unit, body_size(self))
 
     def along(self, t: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """Return A (T, 3, d) at phases t of the mean gait, and half widths of its
         interval."""
-        return self.known.along(t)
+        return self.taylor.along(t)
 
     @property
     def misfit(self) -> np.ndarray:
         """Rms (3,) over the phase of the error of A along the gait, from the misfit of
         xi beyond noise and the truncation of the series."""
-        return np.sqrt((self.known.standard_error[:, 0] ** 2).mean(-1))
+        return np.sqrt((self.taylor.standard_error[:, 0] ** 2).mean(-1))
 
 
 def fit_log(
@@ -248,7 +248,7 @@ def _regress(
     log = rows.log
     loop = rows.loop
     samples = rows.samples()
-    known, varies = _taylor_series(rows, samples, level, harmonics, limits)
+    taylor, varies = _taylor_series(rows, samples, level, harmonics, limits)
     across = varies == regression.RATES
     others = [k for k in range(len(log.joints)) if k not in combined]
     if combined and not across:
@@ -258,15 +258,15 @@ def _regress(
     else:
         combined = {}
 
-    times, measured, predicted = _cycle_poses(rows, known)
-    residual = fit_residual(known, samples, varies)
-    beyond = _beyond_first_order(known, samples, measured, varies)
-    known = replace(known, beyond=beyond, standard_error=residual.standard_error)
+    times, measured, predicted = _cycle_poses(rows, taylor)
+    residual = fit_residual(taylor, samples, varies)
+    beyond = _beyond_first_order(taylor, samples, measured, varies)
+    taylor = replace(taylor, beyond=beyond, standard_error=residual.standard_error)
     uniform = np.interp(log.t, times, np.interp(times, log.t, rows.phase))
     irregular = np.std((rows.phase - uniform)[rows.number >= 0])
     return Fitted(
         log=log,
-        known=known,
+        taylor=taylor,
         times=times,
         measured=measured,
         predicted=predicted,
@@ -324,7 +324,7 @@ def _taylor_series(
             f"entries of A come out as large as {largest:.1g}",
             instead="give x and y in body lengths or m, and joints that move",
         )
-    known = TaylorSeries(
+    taylor = TaylorSeries(
         loop=loop,
         A=A[:, :, 0],
         slope=A[:, :, 1:],
@@ -335,24 +335,24 @@ def _taylor_series(
         factor=regression.interval_factor(len(equations.square), level),
         level=level,
     )
-    return known, varies
+    return taylor, varies
 
 
 def _beyond_first_order(
-    known: TaylorSeries,
+    taylor: TaylorSeries,
     samples: regression.Samples,
     measured: np.ndarray,
     varies: int,
 ) -> np.ndarray:
     """Return the errors (3,) of the net pose beyond those of A and its slopes."""
     # The difference from the measured mean, beyond the error of that mean.
-    mean, mean_error = mean_pose(measured, known.level)
-    square = (_net(known)[0] - mean) ** 2 - mean_error**2
+    mean, mean_error = mean_pose(measured, taylor.level)
+    square = (_net(taylor)[0] - mean) ** 2 - mean_error**2
     difference = SAFETY * np.sqrt(np.maximum(square, 0.0))
 
-    extent = spread(known.loop, samples, None, varies > regression.NOTHING)
-    outward = _outward_change(known, extent)
-    by_gait = known.factor * _error_by_gait(known, samples)
+    extent = spread(taylor.loop, samples, None, varies > regression.NOTHING)
+    outward = _outward_change(taylor, extent)
+    by_gait = taylor.factor * _error_by_gait(taylor, samples)
     return np.sqrt(difference**2 + outward**2 + by_gait**2)
 
 
@@ -370,17 +370,17 @@ def mean_pose(poses: np.ndarray, level: float) -> tuple[np.ndarray, np.ndarray]:
     return poses.mean(0), regression.interval_factor(count, level) * standard_error
 
 
-def _net(known: TaylorSeries) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _net(taylor: TaylorSeries) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the net pose (3,) of the mean gait, its shapes and their rates (PHASES,
     d)."""
     t = 2 * np.pi * np.arange(PHASES) / PHASES
-    alpha = known.loop.shape(t)
-    alphadot = known.loop.shape(t, 1)
-    xi = np.einsum("nij,nj->ni", known.connection(alpha), alphadot)
+    alpha = taylor.loop.shape(t)
+    alphadot = taylor.loop.shape(t, 1)
+    xi = np.einsum("nij,nj->ni", taylor.connection(alpha), alphadot)
     return displacement(xi), alpha, alphadot
 
 
-def _outward_change(known: TaylorSeries, extent: np.ndarray) -> np.ndarray:
+def _outward_change(taylor: TaylorSeries, extent: np.ndarray) -> np.ndarray:
     """Return the change (3,) of the net pose that the phase of the nearest point causes
     in the mean gait.
 
@@ -388,9 +388,9 @@ def _outward_change(known: TaylorSeries, extent: np.ndarray) -> np.ndarray:
     each, are on average outside of it by s^2 / 2 times its curvature at their nearest
     points. extent: (d, d, P), `spread` of the data."""
     t = 2 * np.pi * np.arange(PHASES) / PHASES
-    alpha = known.loop.shape(t)
-    rate = known.loop.shape(t, 1)
-    second = known.loop.shape(t, 2)
+    alpha = taylor.loop.shape(t)
+    rate = taylor.loop.shape(t, 1)
+    second = taylor.loop.shape(t, 2)
     square = (rate**2).sum(-1, keepdims=True)
     along = (second * rate).sum(-1, keepdims=True) / square * rate
     curvature = (second - along) / square
@@ -400,15 +400,15 @@ def _outward_change(known: TaylorSeries, extent: np.ndarray) -> np.ndarray:
 
     wave = 1j * np.arange(PHASES // 2 + 1)[:, None]
     inside_rate = np.fft.irfft(wave * np.fft.rfft(inside, axis=0), PHASES, axis=0)
-    xi = np.einsum("nij,nj->ni", known.connection(inside), inside_rate)
-    return displacement(xi) - _net(known)[0]
+    xi = np.einsum("nij,nj->ni", taylor.connection(inside), inside_rate)
+    return displacement(xi) - _net(taylor)[0]
 
 
-def _error_by_gait(known: TaylorSeries, samples: regression.Samples) -> np.ndarray:
+def _error_by_gait(taylor: TaylorSeries, samples: regression.Samples) -> np.ndarray:
     """Return the standard error (3,) of the net pose by the error of the mean gait,
     whose cycles vary."""
     count = samples.cycle[-1] + 1
-    deviation = samples.alpha - known.loop.shape(samples.phase)
+    deviation = samples.alpha - taylor.loop.shape(samples.phase)
     fitted = []
     for k in range(count):
         rows = samples.cycle == k
@@ -420,16 +420,16 @@ def _error_by_gait(known: TaylorSeries, samples: regression.Samples) -> np.ndarr
     deviations = np.array(fitted) - np.mean(fitted, 0)
 
     t = 2 * np.pi * np.arange(PHASES) / PHASES
-    mean_shape = known.loop.shape(t)
-    mean_rate = known.loop.shape(t, 1)
+    mean_shape = taylor.loop.shape(t)
+    mean_rate = taylor.loop.shape(t, 1)
     alpha = np.array([mean_shape + STEP * series(x, t) for x in deviations])
     alphadot = np.array([mean_rate + STEP * series(x, t, 1) for x in deviations])
-    net = displacement(np.einsum("knij,knj->kni", known.connection(alpha), alphadot))
-    errors = regression.newey_west_terms((net - _net(known)[0]) / STEP / count)
+    net = displacement(np.einsum("knij,knj->kni", taylor.connection(alpha), alphadot))
+    errors = regression.newey_west_terms((net - _net(taylor)[0]) / STEP / count)
     return np.sqrt((errors**2).sum(0))
 
 
-def _cycle_poses(rows: Rows, known: TaylorSeries):
+def _cycle_poses(rows: Rows, taylor: TaylorSeries):
     """Return times (C + 1,), measured (C, 3) and predicted (C, 3) of `Fitted`."""
     from scipy.interpolate import CubicSpline
 
@@ -441,9 +441,9 @@ def _cycle_poses(rows: Rows, known: TaylorSeries):
     times = np.interp(marks, np.maximum.accumulate(phase), t)
 
     # The motion by the connection along the log's own shapes.
-    nearest = known.loop.projected(joints.values, phase)
-    w, terms = known.terms(nearest, joints.values, joints.rates)
-    xi = np.einsum("ijmk,nk,njm->ni", known.combined, w, terms)
+    nearest = taylor.loop.projected(joints.values, phase)
+    w, terms = taylor.terms(nearest, joints.values, joints.rates)
+    xi = np.einsum("ijmk,nk,njm->ni", taylor.combined, w, terms)
     heading = CubicSpline(t, xi[:, 2]).antiderivative()(t)
     velocity = np.exp(1j * heading) * (xi[:, 0] + 1j * xi[:, 1])
     path = CubicSpline(t, velocity).antiderivative()(t)

@@ -33,7 +33,7 @@ JOINT = re.compile(r"(alpha|joint|angle|a|q)_?([0-9]+)")
 UNTIMED = ("phase", "frame", "frames", "sample", "index")
 SPIKE = 20.0  # deviation from neighbouring rows over that of nine in ten rows
 LARGE = 0.05  # of a column's range: least deviation of an outlier
-WHAT = "give a CSV file with a header such as t,alpha_1,alpha_2,x,y,heading"
+HEADERS = "give a CSV file with a header such as t,alpha_1,alpha_2,x,y,heading"
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +101,7 @@ def read(path: str | Path, columns: Sequence[str] = (), degrees: bool = False) -
     (('alpha_1', 'alpha_2'), (1201, 3))
     """
     try:
-        source = read_rows(path, LARGEST_FILE, WHAT)
+        source = read_rows(path, LARGEST_FILE, HEADERS)
         line, header = source.header
         names = [c.strip().lower() for c in columns]
         picked = _pick(source.name, line, header, names)
@@ -227,7 +227,7 @@ def _pick(
     if columns:
         return _check_columns(name, where, header, columns)
     if len(header) < 2:
-        raise Refusal("no header of columns", where=where, instead=WHAT)
+        raise Refusal("no header of columns", where=where, instead=HEADERS)
 
     bare = {c: plain(split_unit(c)[0]) for c in header}
     roles: dict[str, str] = {}
@@ -270,8 +270,10 @@ def _check_columns(
     columns = [c.removeprefix("%") for c in columns]
     missing = [c for c in columns if c not in header]
     if missing:
-        known = formatted(", ".join(header), 200)
-        raise Refusal(f"no column {formatted(missing[0])}; it has {known}", where=where)
+        existing = formatted(", ".join(header), 200)
+        raise Refusal(
+            f"no column {formatted(missing[0])}; it has {existing}", where=where
+        )
     if len(columns) < 6 or len({*columns}) < len(columns):
         raise Refusal(
             "``columns`` are those of t, two joint angles or more, x, y and heading, in"

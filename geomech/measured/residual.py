@@ -49,13 +49,13 @@ class Residual(NamedTuple):
     standard_error: np.ndarray
 
 
-def fit_residual(known: TaylorSeries, samples: Samples, varies: int) -> Residual:
-    """Return the misfit of ``known`` on the samples, with the error of the truncated
+def fit_residual(taylor: TaylorSeries, samples: Samples, varies: int) -> Residual:
+    """Return the misfit of ``taylor`` on the samples, with the error of the truncated
     series."""
 
     def predicted(alpha, rate):
-        w, terms = known.terms(samples.phase, alpha, rate)
-        return np.einsum("ijmk,nk,njm->ni", known.combined, w, terms)
+        w, terms = taylor.terms(samples.phase, alpha, rate)
+        return np.einsum("ijmk,nk,njm->ni", taylor.combined, w, terms)
 
     misfit = samples.xi - predicted(samples.alpha, samples.rate)
     residual = np.sqrt((misfit**2).mean(0) / (samples.rate**2).sum(-1).mean())
@@ -74,30 +74,30 @@ def fit_residual(known: TaylorSeries, samples: Samples, varies: int) -> Residual
     # Along the gait: the square of the mean misfit, over the square of the gait's rate.
     mean_square = places.mean(misfit_1) * places.mean(misfit_2)
     mean_square = mean_square - (common + noise) / places.count
-    speed = (known.loop.shape(samples.phase, 1) ** 2).sum(-1, keepdims=True)
+    speed = (taylor.loop.shape(samples.phase, 1) ** 2).sum(-1, keepdims=True)
     along = COARSE**2 * _averaged(mean_square) / _averaged(places.mean(speed))
 
     # Across the gait: the scatter beyond noise, over the square of the rate across it.
     across = np.zeros_like(along)
     if varies == RATES:
-        normals = known.loop.normals(samples.phase)
+        normals = taylor.loop.normals(samples.phase)
         across_1 = np.einsum("nik,ni->nk", normals, rate_1)
         across_2 = np.einsum("nik,ni->nk", normals, rate_2)
         rate = _averaged(places.mean((across_1 * across_2).mean(-1, keepdims=True)))
         rate = np.maximum(rate, SLOWEST**2 * rate.mean())
         across = _averaged(common - NOISE * noise) / rate
-    square = np.maximum(np.stack([along, across]), 0.0) + TAIL**2 * _truncation(known)
+    square = np.maximum(np.stack([along, across]), 0.0) + TAIL**2 * _truncation(taylor)
     return Residual(residual, explained, np.sqrt(square).transpose(2, 0, 1))
 
 
-def _truncation(known: TaylorSeries) -> np.ndarray:
+def _truncation(taylor: TaylorSeries) -> np.ndarray:
     """Return (2, PLACES, 3): squares of the upper harmonics of A along the gait and
     across it, less the squares of their noise."""
     t = 2 * np.pi * np.arange(PLACES) / PLACES
-    n_waves = known.A.shape[-1]
+    n_waves = taylor.A.shape[-1]
     is_upper = np.arange(n_waves) > 2 * int(UPPER * (n_waves // 2))
-    normals = known.loop.normals(t)
-    rate = known.loop.shape(t, 1)
+    normals = taylor.loop.normals(t)
+    rate = taylor.loop.shape(t, 1)
     tangent = rate / np.linalg.norm(rate, axis=1, keepdims=True)
 
     def squares(coefficients: np.ndarray) -> np.ndarray:
@@ -106,8 +106,8 @@ def _truncation(known: TaylorSeries) -> np.ndarray:
         across = np.einsum("t...ij,tjk->t...ik", A, normals)
         return np.stack([along**2, (across**2).mean(-1)])
 
-    noise = squares(known.errors[:, :, :, 0]).sum(2)
-    excess = [_averaged(a - b) for a, b in zip(squares(known.A), noise)]
+    noise = squares(taylor.errors[:, :, :, 0]).sum(2)
+    excess = [_averaged(a - b) for a, b in zip(squares(taylor.A), noise)]
     return np.maximum(np.stack(excess), 0.0)
 
 

@@ -1,5 +1,5 @@
-"""Results of a measured gait: displacements as logged and by the connection near it, A along
-it, and all data of a look-up there."""
+"""Results of a measured gait: displacements as logged and by the connection near it, A
+along it, and all data of a look-up there."""
 
 from __future__ import annotations
 
@@ -7,35 +7,33 @@ from typing import Any
 
 import numpy as np
 
-from geomech.core.variables import Result, Variable
+from geomech.core.variables import COMPONENTS, POSE, Result, Variable
 from geomech.geometry.curvature import ccf
 from geomech.geometry.curvature import error as curvature_error
 from geomech.geometry.tube import BEYOND
 from geomech.measured.fit import PRINTED_PHASES, Fitted
 from geomech.studies import fields
 from geomech.studies.fields import INTERVAL_OF_CCF, angles_of
-from geomech.studies.tables import COMPONENTS
 from geomech.systems.base import body_size
 
 ALONG = "fitted along the gait alone"
-POSE = ("x", "y", "heading")
 DOTS = 4000  # rows of the log, at most, whose shapes a picture shows
 
 
 def status(fit: Fitted) -> str:
-    """Return which part of A is determined and, if not all, why; with the cure where joints depend on each other."""
+    """Return which part of A is determined and, if not all, why; with the cure where
+    joints depend on each other."""
     if fit.across:
         return "fitted"
     if not fit.combined:
         return f"{ALONG}: its cycles do not vary enough to tell A across it"
-    combinations = ", ".join(
-        f"{fit.log.joints[k]} is {_sum(fit, factors)}"
-        for k, factors in fit.combined.items()
-    )
-    names = ", ".join(fit.log.joints[k] for k in fit.combined)
+    combinations = []
+    for k, factors in fit.combined.items():
+        combinations.append(f"{fit.log.joints[k]} is {_sum(fit, factors)}")
+    names = [fit.log.joints[k] for k in fit.combined]
     return (
-        f"{ALONG}: {combinations}, but for constants and noise, which leaves A across it open: "
-        f"leave {names} out of the columns"
+        f"{ALONG}: {', '.join(combinations)}, but for constants and noise, which "
+        f"leaves A across it open: leave {', '.join(names)} out of the columns"
     )
 
 
@@ -45,9 +43,9 @@ def _sum(fit: Fitted, factors: np.ndarray) -> str:
     return " + ".join(terms).replace("+ -", "- ")
 
 
-def of_fit(fit: Fitted, mapped: bool = True) -> Result:
-    """Return all numbers of a measured gait. mapped: with A and its error on a grid, and
-    the CCF of two joints, nan where there are no data.
+def fit_result(fit: Fitted, mapped: bool = True) -> Result:
+    """Return all numbers of a measured gait. mapped: with A and its error on a grid,
+    and the CCF of two joints, nan where there are no data.
 
     `Connection.load` and [system] kind = "table" read a file of it that is mapped."""
     variables = [
@@ -55,7 +53,7 @@ def of_fit(fit: Fitted, mapped: bool = True) -> Result:
         *_quality(fit),
         *_along(fit),
         *_cycles(fit),
-        *fields.of_known(fit.known, fit.unit),
+        *fields.of_known(fit.taylor, fit.unit),
     ]
     lead = [
         Variable("component", ("component",), np.array(COMPONENTS)),
@@ -79,8 +77,9 @@ def _units(fit: Fitted) -> tuple[str, str, str]:
 
 def _displacements(fit: Fitted) -> list[Variable]:
     """Return the displacement of a cycle, as logged and of the mean gait."""
-    (net, error), (mean, mean_error) = fit.displacement, fit.mean
-    interval = f"half width of the interval of {fit.known.level:.3g} of cases"
+    net, error = fit.displacement
+    mean, mean_error = fit.mean
+    interval = f"half width of the interval of {fit.taylor.level:.3g} of cases"
     found = []
     for ending, label, values, errors in (
         ("", "per cycle, mean of the log", mean, mean_error),
@@ -97,8 +96,9 @@ def _displacements(fit: Fitted) -> list[Variable]:
 
 def _quality(fit: Fitted) -> list[Variable]:
     """Return how well the connection explains the log."""
-    over, rates = ("component",), fields.of_components(fit.unit, "rad")
-    apart = np.sqrt(((fit.measured - fit.predicted) ** 2).mean(0))
+    over = ("component",)
+    rates = fields.of_components(fit.unit, "rad")
+    difference = np.sqrt(((fit.measured - fit.predicted) ** 2).mean(0))
     recorded = (*fit.log.joints, *POSE)
     of_time = "Hz" if fit.log.seconds else "1/unit of t"
     noise_units = ("rad",) * len(fit.log.joints) + _units(fit)
@@ -109,10 +109,10 @@ def _quality(fit: Fitted) -> list[Variable]:
             "rms of the phase about a uniform run through each cycle",
         ),
         Variable(
-            "harmonics", (), fit.known.A.shape[-1] // 2, "1", "of A in the phase"
+            "harmonics", (), fit.taylor.A.shape[-1] // 2, "1", "of A in the phase"
         ),
         Variable(
-            "difference", over, apart, _units(fit),
+            "difference", over, difference, _units(fit),
             "rms of the difference of cycles as logged and as predicted",
         ),
         Variable(
@@ -126,7 +126,8 @@ def _quality(fit: Fitted) -> list[Variable]:
         ),
         Variable(
             "misfit", over, fit.misfit, rates,
-            "rms over the phase of the error of A along the gait by what the fit leaves",
+            "rms over the phase of the error of A along the gait by what the fit "
+            "leaves",
         ),
         Variable("recorded", ("recorded",), np.array(recorded)),
         Variable("noise", ("recorded",), fit.noise, noise_units, "of a row"),
@@ -141,8 +142,9 @@ def _along(fit: Fitted) -> list[Variable]:
     return [
         Variable("phase", ("phase",), t, "rad", "of the mean gait"),
         Variable(
-            "A_along", ("component", "joint", "phase"), A, rates, "A along the mean gait",
-            error, error_label="half width of the interval of A",
+            "A_along", ("component", "joint", "phase"), A, rates,
+            "A along the mean gait", error,
+            error_label="half width of the interval of A",
         ),
         Variable(
             "reach_along", ("phase",), _reach(fit), "rad",
@@ -154,7 +156,7 @@ def _along(fit: Fitted) -> list[Variable]:
 def _reach(fit: Fitted) -> np.ndarray:
     """Return the half width of the data across the gait, rad, in the direction in which
     it is least, at PRINTED_PHASES."""
-    spread = fit.known.spread
+    spread = fit.taylor.spread
     least = np.sqrt(np.linalg.eigvalsh(np.moveaxis(spread, -1, 0))[:, 0])
     return least[np.arange(PRINTED_PHASES) * spread.shape[-1] // PRINTED_PHASES]
 
@@ -172,9 +174,9 @@ def _cycles(fit: Fitted) -> list[Variable]:
             name = f"{name}_per_cycle{ending}"
             found.append(Variable(name, ("cycle",), values[:, k], unit, label))
     shapes = fit.samples.alpha
-    some = shapes[:: max(1, len(shapes) // DOTS)]
+    shapes = shapes[:: max(1, len(shapes) // DOTS)]
     label = "shapes of rows of the log, smoothed"
-    return [*found, Variable("shapes", ("row", "joint"), some, "rad", label)]
+    return [*found, Variable("shapes", ("row", "joint"), shapes, "rad", label)]
 
 
 def _maps(fit: Fitted) -> tuple[list[Variable], list[Variable]]:
@@ -185,8 +187,8 @@ def _maps(fit: Fitted) -> tuple[list[Variable], list[Variable]]:
     _, _, *axes = fields.coordinates(tube.axes, labels)
     maps = [*fields.of_connection(tube, error), fields.of_reach(tube)]
     if len(tube.axes) == 2:
-        curvature = ccf(tube), curvature_error(tube), INTERVAL_OF_CCF
-        maps.append(fields.of_ccf(*curvature))
+        error = curvature_error(tube)
+        maps.append(fields.of_ccf(ccf(tube), error, INTERVAL_OF_CCF))
     return axes, maps
 
 
@@ -195,19 +197,23 @@ def _about(fit: Fitted) -> dict[str, Any]:
         "form": "log",
         "file": fit.log.name,
         "title": f"Local connection near the mean gait of the log {fit.log.name}",
-        "Conventions": "xi = + A alphadot; CCF = dA + [A, A], positive for counter-clockwise loops",
-        "method": "first-order Taylor series of A in the deviation from the mean gait, by regression over all cycles (Bittner, "
-        "Hatton and Revzen, Nonlinear Dynamics 94, 1933 (2018))",
+        "Conventions": "xi = + A alphadot; CCF = dA + [A, A], positive for "
+        "counter-clockwise loops",
+        "method": "first-order Taylor series of A in the deviation from the mean gait, "
+        "by regression over all cycles (Bittner, Hatton and Revzen, Nonlinear Dynamics "
+        "94, 1933 (2018))",
         "frame": "that of the log",
         "frame_meaning": "body frame: the one whose x, y and heading were logged",
         "body_length": float(body_size(fit)),
         "length_unit": fit.unit,
-        "components": "x, y, theta of the body velocity xi: along the heading, to the left, counter-clockwise",
+        "components": "x, y, theta of the body velocity xi: along the heading, to the "
+        "left, counter-clockwise",
         "sign_of_A": "xi = + A alphadot",
-        "sign_of_ccf": "CCF = dA + [A, A] with [X, Y] = XY - YX, positive for counter-clockwise loops",
+        "sign_of_ccf": "CCF = dA + [A, A] with [X, Y] = XY - YX, positive for "
+        "counter-clockwise loops",
         "pair_of_ccf": "CCF_12 = dA_2 / dalpha_1 - dA_1 / dalpha_2 + [A_1, A_2]",
-        "level": float(fit.known.level),
-        "error_factor": float(fit.known.factor),
+        "level": float(fit.taylor.level),
+        "error_factor": float(fit.taylor.factor),
         "cycles": len(fit.measured),
         "rows": len(fit.log.t),
         "columns": ", ".join(fit.log.joints),

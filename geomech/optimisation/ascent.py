@@ -46,7 +46,9 @@ def ascend(
     stays one. singularity: a function of shapes that is 0 at singular ones; it stays at
     least ``away`` from 0. on_cycle: called after every cycle. even: see `Problem`."""
     problem = Problem(cycles, objective, p, on_cycle, TRIES * max_steps, even)
-    first_stroke = Stroke(cycles.loops, p) if stroke else None
+    first_stroke = None
+    if stroke:
+        first_stroke = Stroke(cycles.loops, p)
     constraints = problem.constraints(turn, first_stroke, singularity, away)
 
     def is_same_stroke(x):
@@ -93,7 +95,9 @@ def project(
     Newton's method: each step is the shortest that satisfies the linearised
     constraints."""
     problem = Problem(cycles, objective, p, lambda: None, np.inf)
-    first_stroke = Stroke(cycles.loops, p) if stroke else None
+    first_stroke = None
+    if stroke:
+        first_stroke = Stroke(cycles.loops, p)
     constraints = problem.constraints(turn, first_stroke, singularity, away, dense=True)
     x = problem.first
     for _ in range(NEWTON_STEPS):
@@ -141,7 +145,9 @@ def _shortest(constraints: list[tuple]) -> np.ndarray:
     solution = minimize(
         lambda x: (x @ x / 2, x), rest, jac=True, method="SLSQP", constraints=linear
     )
-    return unit * solution.x if solution.success else rest
+    if not solution.success:
+        return rest
+    return unit * solution.x
 
 
 def _linear(kind: str, y: np.ndarray, A: np.ndarray) -> dict:

@@ -21,17 +21,18 @@ from geomech.systems.capabilities import OwnMetric, capability
 class Evaluation:
     """A gait as evaluated by the direct tier.
 
-    value, error: of the objective. heading: error of the net turn, rad. displacement:
-    net pose (3,) in the frame at the start, in the system's unit. length: of the path;
-    work: of a cycle at a rad of phase per unit of time, in body drag x body length;
-    None where these are not known, and for the work of a metric that is not one of
-    drag. time: of a rad of phase. limits: names of those that set the time."""
+    value, error: of the objective. displacement: net pose (3,) in the frame at the
+    start, x and y in the system's unit, heading in rad; displacement_error: (3,), its
+    estimated error. length: of the path; work: of a cycle at a rad of phase per unit of
+    time, in body drag x body length; None where these are not known, and for the work
+    of a metric that is not one of drag. time: of a rad of phase. limits: names of those
+    that set the time."""
 
     gait: Gait
     value: float
     error: float
-    heading: float
     displacement: np.ndarray
+    displacement_error: np.ndarray
     length: float | None
     work: float | None
     time: float
@@ -45,9 +46,12 @@ def evaluate_gait(request: Request, gait: Gait) -> Evaluation:
     phases = max(request.phases, 4 * gait.harmonics)
     amplitudes = np.array([gait.amplitude])
     (net,), (errors,) = estimate.direct(scene, gait, amplitudes, phases)
+    position_error, heading_error = errors  # body lengths, rad
 
     alpha, alphadot = gait.cycle(phases)
-    degree = request.degree if request.power else 1.0
+    degree = 1.0
+    if request.power:
+        degree = request.degree
     run = scene.system.run(alpha, alphadot, request.power is not None)
     P = _power(request, run, alpha, alphadot)
     _, *others = cycle_values(run, P, degree)
@@ -62,13 +66,17 @@ def evaluate_gait(request: Request, gait: Gait) -> Evaluation:
         period, limits = objective.time(fastest, power, degree)
     value = objective.value(cycle, period)[0]
 
-    error = errors[1] if objective.name == "turning" else errors[0]
+    error = position_error
+    if objective.name == "turning":
+        error = heading_error
     if objective.name == "efficiency":
         length_error = _length_error(request, alpha, alphadot, P, length)
         error = (error + value * length_error) / (length or 1.0)
     if objective.timed:
         error = error / (2 * np.pi * (period or 1.0))
 
+    # The error of the position bounds those of x and of y.
+    xy_error = position_error * body_size(scene.system)
     work = None
     if cycle.power and capability(scene.system, OwnMetric) is None:
         work = 2 * np.pi * power
@@ -76,8 +84,8 @@ def evaluate_gait(request: Request, gait: Gait) -> Evaluation:
         gait,
         float(value),
         float(error),
-        float(errors[1]),
         net,
+        np.array([xy_error, xy_error, heading_error]),
         length,
         work,
         float(period),
@@ -116,5 +124,6 @@ def _without_slopes(x) -> tuple | None:
     """Return a number or array with slopes of 0, as `CycleValues` has them."""
     if x is None:
         return None
-    value = x if np.ndim(x) else float(x)
-    return value, np.zeros((*np.shape(x), 1))
+    if np.ndim(x) == 0:
+        x = float(x)
+    return x, np.zeros((*np.shape(x), 1))

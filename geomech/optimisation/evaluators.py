@@ -22,7 +22,7 @@ def direct(request: Request, phases: int | None = None) -> Phases | Runs:
     loops = request.loops
     if phases is not None:
         loops = dataclasses.replace(loops, phases=phases)
-    if request.by_runs:
+    if request.uses_runs:
         return Runs(loops, system.run, costs, degree, body_size(system))
     velocity = system.velocity
     if request.table is not None:

@@ -49,7 +49,9 @@ def checked_limits(scene: Scene, limits: LimitsArgument, phases: int) -> Limits:
     slack = 1e-9 * (1 + np.abs(pairs.T))
     if (lowest < low - slack[0]).any() or (highest > high + slack[1]).any():
         field = ", ".join(f"{a:g} to {b:g}" for a, b in zip(low, high))
-        text = f"{limits:g}" if is_number(limits) else formatted(limits)
+        text = formatted(limits)
+        if is_number(limits):
+            text = f"{limits:g}"
         raise Refusal(
             f"``limits`` {text} lies outside the field that the scene has",
             instead=f"{field}; keep to it",

@@ -215,9 +215,15 @@ class Loops:
     def _wave(self, k: int, rng) -> np.ndarray:
         """Return the k-th travelling wave of the starts; all but the first
         perturbed."""
-        step = LAGS[k] if k < len(LAGS) else rng.uniform(-np.pi, np.pi)
+        if k < len(LAGS):
+            step = LAGS[k]
+        else:
+            step = rng.uniform(-np.pi, np.pi)
         lag = np.arange(self.joints) * step
-        size = self.half * (FIRST_SIZE if k == 0 else rng.uniform(*SIZES))
+        share = FIRST_SIZE
+        if k > 0:
+            share = rng.uniform(*SIZES)
+        size = self.half * share
         p = np.zeros(self.shape)
         p[0] = self.middle
         p[1] = size * np.cos(lag)

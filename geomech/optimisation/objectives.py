@@ -103,7 +103,9 @@ class Objective:
 
         if time == 0:  # the gait rests
             return 0.0, 0 * slopes
-        period = 2 * np.pi * time if self.timed else 1.0
+        period = 1.0
+        if self.timed:
+            period = 2 * np.pi * time
         return distance / period, slopes / period
 
     def _displacement(self, cycle: CycleValues) -> tuple[float, np.ndarray]:

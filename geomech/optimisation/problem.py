@@ -62,7 +62,9 @@ class Problem:
         self.time = 1.0
         if objective.timed:
             fastest = np.abs(self.loops.cycle(p)[1]).max()
-            power = cycle.power[0] if cycle.power else None
+            power = None
+            if cycle.power:
+                power, _ = cycle.power
             self.time, _ = objective.time(fastest, power, cycles.degree)
         self.weight = 0.0
         if not self.paced:
@@ -103,7 +105,7 @@ class Problem:
         if self.paced:
             slower = x[-1]
         elif self.objective.timed:
-            slower, slower_by_p = self.by_power(cycle)
+            slower, slower_by_p = self.relative_time(cycle)
             by_p = by_p - value / slower * slower_by_p
 
         penalty, penalty_by_p = cycle.uneven
@@ -112,7 +114,7 @@ class Problem:
             slopes[-1] = value / slower**2
         return self.weight * penalty - value / slower, slopes
 
-    def by_power(self, cycle: CycleValues) -> tuple[float, np.ndarray]:
+    def relative_time(self, cycle: CycleValues) -> tuple[float, np.ndarray]:
         """Return the time of a rad of phase by the limit of power, over that of p, and
         its slopes in p."""
         P, dP = cycle.power
@@ -152,7 +154,9 @@ class Problem:
 def is_feasible(rule: dict, x: np.ndarray) -> bool:
     """Return whether numbers x satisfy a constraint, nearly."""
     values = rule["fun"](x)
-    violation = np.abs(values) if rule["type"] == "eq" else -values
+    violation = -values
+    if rule["type"] == "eq":
+        violation = np.abs(values)
     return bool(violation.max() <= FEASIBLE)
 
 
@@ -181,11 +185,11 @@ def _power(problem: Problem) -> dict:
     """Return the constraint that the time, the last of x, is what the power allows."""
 
     def slack(x):
-        slower, _ = problem.by_power(problem.values_at(x))
+        slower, _ = problem.relative_time(problem.values_at(x))
         return np.array([x[-1] - slower])
 
     def slopes(x):
-        _, slower_by_p = problem.by_power(problem.values_at(x))
+        _, slower_by_p = problem.relative_time(problem.values_at(x))
         by_x = -problem.slopes(slower_by_p)[None]
         by_x[:, -1] = 1.0
         return by_x

@@ -87,7 +87,7 @@ class Request:
         return system.inner if isinstance(system, Framed) else system
 
     @property
-    def by_runs(self) -> bool:
+    def uses_runs(self) -> bool:
         """Whether gaits are run as a whole."""
         return self.system.traits.steps or isinstance(self.loops, Undulations)
 
@@ -96,7 +96,7 @@ class Request:
         """Whether the search begins with tables."""
         system = self.system
         return (
-            not self.by_runs
+            not self.uses_runs
             and system.joints == 2
             and not system.traits.linear
             and self.table is None
@@ -208,7 +208,7 @@ class Request:
 
         # The ascents themselves: steps, cycles per step, gaits per cycle.
         gaits_per_cycle = 1 + 4 * self.system.joints
-        if self.by_runs:
+        if self.uses_runs:
             gaits_per_cycle = 1 + 2 * int(np.prod(loops.shape))
         gaits = int(self._direct_steps(improved) * TRIES * gaits_per_cycle)
         jobs += cost.direct(
@@ -229,10 +229,12 @@ class Request:
     def _direct_steps(self, improved: int) -> float:
         """Return the number of steps by the direct tier, at the phases of the loops."""
         if self.uses_tables:
-            perturbed = 2 * N_PERTURBED if self.starts > 1 else 0
+            perturbed = 0
+            if self.starts > 1:
+                perturbed = 2 * N_PERTURBED
             last = LAST_STEPS * self.phases / self.loops.phases
             return (improved + 2 * perturbed) * DIRECT_STEPS + last
-        if self.by_runs:
+        if self.uses_runs:
             return self.starts * RUN_STEPS
         return self.starts * TABLE_STEPS
 
@@ -278,7 +280,8 @@ def build_request(
     0.101
     """
     with located(checked_scene(scene).name):
-        in_range("``starts``", 1 if starts is None else starts, 1, 1000, whole=True)
+        n_starts = 1 if starts is None else starts
+        in_range("``starts``", n_starts, 1, 1000, whole=True)
         system = scene.system
         if near_gait(system):
             raise Refusal(
@@ -291,7 +294,7 @@ def build_request(
         if isinstance(loops, Undulations):
             _check_undulations(maximised, system)
 
-        request = Request(scene, maximised, loops, 1 if starts is None else int(starts))
+        request = Request(scene, maximised, loops, int(n_starts))
         if starts is None and request.uses_tables:
             count = 1 + len(OUTLINES)
             if _in_mirror(request):
@@ -313,8 +316,9 @@ def _objective(
     """Return the objective; for speed without limits, those of the scene's own gait."""
     system = scene.system
     size = body_size(system)
-    towards = "" if direction is None else direction
-    objective = Objective(name, towards, size, rate=rate, power=power)
+    if direction is None:
+        direction = ""
+    objective = Objective(name, direction, size, rate=rate, power=power)
     if not objective.timed:
         return objective
     if system.traits.lacks & Premise.RATE_INDEPENDENT:
@@ -327,8 +331,8 @@ def _objective(
     if rate is not None or power is not None:
         return objective
     if isinstance(scene.gait, Sine):
-        return Objective(name, towards, size, power=_own_power(scene))
-    return Objective(name, towards, size, rate=_own_rate(scene))
+        return Objective(name, direction, size, power=_own_power(scene))
+    return Objective(name, direction, size, rate=_own_rate(scene))
 
 
 def _check_undulations(objective: Objective, system: System) -> None:
@@ -440,7 +444,9 @@ def _own_power(scene: Scene) -> float:
     alpha, alphadot = scene.gait.cycle(PHASES)
     work = system.run(alpha, alphadot, True).work
     power = np.maximum(work.power, 0.0).mean() / body_size(system)
-    rate = 2 * np.pi * scene.frequency if scene.frequency else 1.0
+    rate = 1.0
+    if scene.frequency:
+        rate = 2 * np.pi * scene.frequency
     return float(power * rate**system.traits.power_degree) or 1.0
 
 

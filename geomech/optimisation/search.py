@@ -121,7 +121,7 @@ class _Search:
         self.count = 0
         self.completed = 0
         ascents = request.ascents + self._rough
-        steps = RUN_STEPS if request.by_runs else DIRECT_STEPS
+        steps = RUN_STEPS if request.uses_runs else DIRECT_STEPS
         self.cycles_per_ascent = TRIES * steps  # a rough estimate
         self.expected = ascents * self.cycles_per_ascent
 
@@ -193,7 +193,7 @@ class _Search:
         request = self.request
         tier = evaluators.direct(request)
         if not request.uses_tables:
-            steps = RUN_STEPS if request.by_runs else TABLE_STEPS
+            steps = RUN_STEPS if request.uses_runs else TABLE_STEPS
             optima = self._optima(tier, starts, turn, None, steps)
             return self._different(optima), ()
 
@@ -370,7 +370,9 @@ class _Search:
         period = 1.0
         if objective.timed:
             fastest = np.abs(tier.loops.cycle(p)[1]).max()
-            power = cycle.power[0] if cycle.power else None
+            power = None
+            if cycle.power:
+                power, _ = cycle.power
             period, _ = objective.time(fastest, power, tier.degree)
         value, by_p = objective.value(cycle, period)
         if objective.straight:
@@ -379,7 +381,9 @@ class _Search:
             excess = theta - np.clip(theta, -turn, turn)
             square = (theta_by_p**2).sum() or 1.0
             value -= excess * (by_p * theta_by_p).sum() / square
-        return float(value) if np.isfinite(value) else -np.inf
+        if not np.isfinite(value):
+            return -np.inf
+        return float(value)
 
     def _ascend(self, cycles, p, ascent: Ascent) -> np.ndarray:
         """Return the loop that an ascent from p reaches, and count its cycles."""
@@ -432,8 +436,8 @@ class _Search:
         """Return the allowed excess of a net turn, rad: roundoff and, where cycles are
         not those of the search, their error."""
         request = self.request
-        if request.by_runs or request.system is not request.scene.system:
-            return NO_TURN + evaluation.heading
+        if request.uses_runs or request.system is not request.scene.system:
+            return NO_TURN + evaluation.displacement_error[2]
         return NO_TURN
 
     def _report(self, cycles: int = 1) -> None:
@@ -484,7 +488,7 @@ class _Search:
         request = self.request
         if not request.objective.direction or not isinstance(request.loops, Loops):
             return p
-        if request.by_runs:
+        if request.uses_runs:
             return p
         for _ in range(3):  # the crossing nearest to the start, refined
             alpha, alphadot = request.loops.cycle(p)

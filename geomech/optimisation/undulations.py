@@ -12,10 +12,10 @@ from geomech.gaits import Sine
 from geomech.optimisation.loops import TOUCHING
 
 NAMES = ("amplitude", "waves")
-LEAST = (0.01, 0.5)
-MOST = (1.0, 4.0)
+SMALLEST = (0.01, 0.5)
+LARGEST = (1.0, 4.0)
 ELEMENTS_PER_WAVE = 12  # with fewer a sine is a polygon
-SAME = 0.01  # largest difference of a parameter between sines that count as the same
+EQUAL = 0.01  # largest difference of a parameter between sines that count as the same
 
 
 @dataclass(frozen=True)
@@ -33,9 +33,9 @@ class Undulations:
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Least and largest parameters, (2,) each."""
-        amplitude, waves = MOST
+        amplitude, waves = LARGEST
         waves = min(waves, self.first.elements / ELEMENTS_PER_WAVE)
-        return np.array(LEAST), np.array([amplitude, waves])
+        return np.array(SMALLEST), np.array([amplitude, waves])
 
     def cycle(self, p) -> tuple[np.ndarray, np.ndarray]:
         """Return alpha and alphadot (..., N, joints) of sines p (..., 2)."""
@@ -82,4 +82,4 @@ class Undulations:
 
     def is_same(self, p, q) -> bool:
         """Return whether two sines are the same."""
-        return bool(np.abs(np.asarray(p) - q).max() < SAME)
+        return bool(np.abs(np.asarray(p) - q).max() < EQUAL)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from geomech.core.variables import Variable
+from geomech.core.variables import POSE, Variable
 from geomech.geometry.symmetry import zero_components
 from geomech.optimisation.limiting import PHASES, limiting
 from geomech.optimisation.optimum import Optimum
@@ -25,7 +25,8 @@ HOW = ("refined", "by a table alone")
 
 
 def attributes(optimum: Optimum) -> dict[str, Any]:
-    """Return the objective with its limits, and the scene with the best gait as text."""
+    """Return the objective with its limits, and the scene with the best gait as
+    text."""
     objective = optimum.request.objective
     facts: dict[str, Any] = {
         "objective": objective.name,
@@ -74,21 +75,22 @@ def values(optimum: Optimum) -> list[Variable]:
 
 
 def displacement(optimum: Optimum) -> list[Variable]:
-    """Return the pose after a cycle, path length and work where they are known, and the
-    frequency of a gait that is timed."""
+    """Return the pose after a cycle with its errors, path length and work where they
+    are known, and the frequency of a gait that is timed."""
     system = optimum.scene.system
     best = optimum.best
     length = length_unit(system)
     reasons = zero_components(system.traits, optimum.gait)
+    pose_units = (length, length, "rad")
     found = []
-    for name, value, unit in zip(
-        ("x", "y", "heading"), best.displacement, (length, length, "rad")
+    for name, value, error, unit in zip(
+        POSE, best.displacement, best.displacement_error, pose_units
     ):
         zero = ""
         if name in reasons:
             zero = zero_words(reasons[name])
         label = "net displacement per cycle"
-        found.append(Variable(name, (), value, unit, label, zero=zero))
+        found.append(Variable(name, (), value, unit, label, error, zero=zero))
 
     effort_units = units(system)
     for name, value in (("path_length", best.length), ("work", best.work)):

@@ -1,9 +1,9 @@
 """Questions, one a file: its fields, its checks, its computation, its headline and its
 picture.
 
-A new one is a file and a line here. Its command, its method of `geomech.study(...)`, its
-reference and JSON Schema, the digest under which an interrupted computation is resumed,
-files of all formats and its form in a notebook follow from its class.
+A new one is a file and a line here. Its command, its method of `geomech.study(...)`,
+its reference and JSON Schema, the digest under which an interrupted computation is
+resumed, files of all formats and its form in a notebook follow from its class.
 """
 
 from importlib import import_module
@@ -42,8 +42,8 @@ SUMMARIES = {name: line for lines in GROUPS.values() for name, line in lines.ite
 
 
 def question(name: str) -> Any:
-    """Return the class of a question, such as `Velocity` for "velocity"; KeyError for an
-    unknown name."""
+    """Return the class of a question, such as `Velocity` for "velocity"; KeyError for
+    an unknown name."""
     if name not in SUMMARIES:
         raise KeyError(name)
     class_name = "".join(part.capitalize() for part in name.split("_"))

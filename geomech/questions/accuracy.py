@@ -1,15 +1,20 @@
 """Error against computing time of an answer, at settings of every approximation."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+import numpy as np
+
+from geomech.core.variables import Result
 from geomech.questions import loading, names
 from geomech.questions.base import Option, Question, Run, Subject
+from geomech.results.numbers import number, size
+from geomech.run.cost import Cost
+from rft.core.checks import in_range
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
-    from geomech.run.cost import Cost
     from geomech.scenes import Intruding, Scene, WalkerScene
     from geomech.studies.accuracy import Adjustable
 
@@ -20,15 +25,15 @@ SHOWN = (
     "best_seconds",
     "coarsest_value",
 )
-MOST_RUNS = 1000  # assumed
+LARGEST_RUNS = 1000  # of one setting; assumed
 ERRORS = ("error", "force_error", "moment_error")
 
 
 @dataclass(frozen=True)
 class Accuracy(Question):
     """Measure error against time for every tier and setting. The cheapest settings that
-    meet an error are listed. The settings of an intruder scene are numbers of elements or
-    triangles; of a robot, steps, elements and rounding."""
+    meet an error are listed. The settings of an intruder scene are numbers of elements
+    or triangles; of a robot, steps, elements and rounding."""
 
     scene: Annotated[
         "Scene | Intruding | WalkerScene",
@@ -50,22 +55,20 @@ class Accuracy(Question):
         return accuracy.adjustable(self.scene, self.runs)
 
     def check(self) -> None:
-        from rft.core.checks import in_range
-
         if self.runs is not None:
-            in_range("runs", self.runs, 1, MOST_RUNS, whole=True)
+            in_range("runs", self.runs, 1, LARGEST_RUNS, whole=True)
         self.adjustable.check()
 
-    def cost(self) -> "Cost":
+    def cost(self) -> Cost:
         return self.adjustable.cost()
 
-    def compute(self, run: Run) -> "Result":
+    def compute(self, run: Run) -> Result:
         from geomech.studies import accuracy
 
         return accuracy.answer(self.adjustable, run.progress)
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
+    def headline(result: Result) -> list[str]:
         facts = result.attributes
         words = f"{facts['scene']}: error of {facts['about']}"
         if "speed" in result:
@@ -73,19 +76,17 @@ class Accuracy(Question):
         return [f"{words} against seconds of computing"]
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         return result.only(*SHOWN)
 
     @staticmethod
-    def remarks(result: "Result") -> list[str]:
-        from geomech.results.numbers import size
-
+    def remarks(result: Result) -> list[str]:
         lines = []
         if "own_error" in result:
-            own = size(float(result["own_error"]))
+            system_error = size(float(result["own_error"]))
             lines.append(
-                f"errors in the table include the system's own, {own} BL, which no "
-                "setting takes away; those below do not"
+                f"errors in the table include the system's own, {system_error} BL, "
+                "which no setting takes away; those below do not"
             )
         for k in range(result.sizes["setting"]):
             for name in ERRORS:
@@ -94,7 +95,7 @@ class Accuracy(Question):
         return lines
 
     @staticmethod
-    def draw(result: "Result") -> Any:
+    def draw(result: Result) -> Any:
         """Draw errors against seconds or against the values of settings; return the
         Figure."""
         from geomech import plots
@@ -102,38 +103,34 @@ class Accuracy(Question):
         return plots.accuracy_figure(result)
 
 
-def setting_words(result: "Result", k: int, name: str) -> str:
-    """Return in a sentence what a setting gains: its coarsest and its finest value, their
-    errors and seconds, and the measured order."""
-    from geomech.results.numbers import number, size
-
+def setting_words(result: Result, k: int, name: str) -> str:
+    """Return in a sentence what a setting gains: its coarsest and its finest value,
+    their errors and seconds, and the measured order."""
     values = ends(result, k, "value")
-    errors, seconds = ends(result, k, name), ends(result, k, "seconds")
+    errors = ends(result, k, name)
+    seconds = ends(result, k, "seconds")
     about = name.replace("_", " ")
     unit = error_words(result, name)
     if str(result["against"][k]) == "limit":
         unit = f"{unit} against its own limit"
-    words = [
+    words = (
         f"{result['setting'][k]} {number(values[0])} to {number(values[1])}: "
         f"{about} {size(errors[0])} to {size(errors[1])}{unit} "
         f"in {number(seconds[0])} to {number(seconds[1])} s"
-    ]
+    )
     if "buys" in result:
-        words.append(f"; buys {result['buys'][k]}")
-    words.append(f" ({order_words(result, k, name)})")
-    return "".join(words)
+        words = f"{words}; buys {result['buys'][k]}"
+    return f"{words} ({order_words(result, k, name)})"
 
 
-def ends(result: "Result", k: int, name: str) -> tuple[float, float]:
-    """Return what a setting has at its coarsest and at its finest value."""
-    import numpy as np
-
+def ends(result: Result, k: int, name: str) -> tuple[float, float]:
+    """Return a variable of a setting at its coarsest and at its finest value."""
     row = result[name][k]
     row = row[np.isfinite(result["value"][k])]
     return float(row[0]), float(row[-1])
 
 
-def error_words(result: "Result", name: str) -> str:
+def error_words(result: Result, name: str) -> str:
     """Return the unit of an error, as it stands behind a number."""
     unit = result[name].units
     if unit == "1":
@@ -141,10 +138,8 @@ def error_words(result: "Result", name: str) -> str:
     return f" {unit}"
 
 
-def order_words(result: "Result", k: int, name: str) -> str:
+def order_words(result: Result, k: int, name: str) -> str:
     """Return the measured order of an error beside that of theory."""
-    import math
-
     order = float(result[name.removesuffix("error") + "order"][k])
     measured = f"measured order {order:.1f}"
     if math.isnan(order):

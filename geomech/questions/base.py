@@ -1,9 +1,10 @@
 """What a question is: a frozen dataclass whose annotated fields are its options.
 
 A module of a question imports what computes and what draws within its functions, and
-names types that it does not need to run in quotes, so that the help of its command loads
-neither NumPy nor a figure. It has no ``from __future__ import annotations``: options are
-read from the annotations.
+quotes types that it does not need to run: the help of its command loads NumPy, but no
+scenes, splines or figures. This module and those of the texts load no NumPy either, as
+the list of all commands imports them. A module of a question has no
+``from __future__ import annotations``: options are read from the annotations.
 """
 
 import contextlib
@@ -34,8 +35,9 @@ SCENE_HELP = "built-in name (see 'geomech scenes') or TOML file"
 class Option:
     """What a field means, and how a command line gives it.
 
-    help: a line. metavar: what stands for its value. parse: returns the value of a text;
-    without it the type of the field is read. flag: its name there, if it is another.
+    help: a line. metavar: what stands for its value. parse: returns the value of a
+    text; without it the type of the field is read. flag: its name there, if it is
+    another.
     repeated: it may be given more than once, and a list of texts is parsed."""
 
     help: str
@@ -50,8 +52,8 @@ class Subject:
     """What a question is about, as its command's first argument: mostly a scene.
 
     load: returns it from its text and from the values of ``changes``, options of the
-    command that change it (`geomech.command.CHANGES`). names: returns those that a shell
-    completes. default: what is taken where nothing is given; "" if it must be."""
+    command that change it (`geomech.command.CHANGES`). names: returns those that a
+    shell completes. default: what is taken where nothing is given; "" if it must be."""
 
     load: Callable[..., Any]
     names: Callable[[], list[str]] | None = None
@@ -62,17 +64,17 @@ class Subject:
 
 
 def ignore(_: Any) -> None:
-    """Take no notice of progress or of cost."""
+    """Ignore progress, or a cost."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """What a computation is given besides its question.
+    """The surroundings of a computation.
 
-    progress: called with the fraction done. allow: called with a cost that was not known
-    beforehand; raises where it is too much. limited: whether limits of cost hold, for a
-    computation that can check them only on its way. tables: of the scene, if there are
-    some already."""
+    progress: called with the fraction done. allow: called with a cost that was not
+    known beforehand; raises where it is too much. limited: whether limits of cost hold,
+    for a computation that can check them only on its way. tables: of the scene, if
+    there are some already."""
 
     progress: Progress = ignore
     allow: Allow = ignore
@@ -81,7 +83,7 @@ class Run:
 
     @property
     def shown_progress(self) -> Progress | None:
-        """The progress that is shown; None where what computes shows its own."""
+        """The progress that is shown; None where the computation shows its own."""
         if self.progress is ignore:
             return None
         return self.progress
@@ -134,8 +136,8 @@ class Question(Plain):
 
     @property
     def subject(self) -> Any:
-        """What the question is about: the value of its field marked `Subject`; None of a
-        question that has none."""
+        """What the question is about: the value of its field marked `Subject`; None of
+        a question that has none."""
         name, _ = subject_field(type(self))
         if not name:
             return None
@@ -186,8 +188,8 @@ class Question(Plain):
         return dataclasses.replace(result, attributes=facts, question=self)
 
     def ask(self, tables: Any = None) -> "Result":
-        """Return the answer without limits of cost, as from Python. tables: of the scene,
-        if there are some already."""
+        """Return the answer without limits of cost, as from Python. tables: of the
+        scene, if there are some already."""
         self.check()
         return self.answer(Run(self.progress or ignore, tables=tables))
 
@@ -212,10 +214,10 @@ def subject_facts(subject: Any) -> dict[str, str]:
 
 
 def subject_field(question: type[Question]) -> tuple[str, Subject | None]:
-    """Return the name of the field that a question is about, and what it is; "" and None
-    of a question that consists of options alone."""
+    """Return the name of the field that a question is about, and what it is; "" and
+    None of a question that consists of options alone."""
     for field in dataclasses.fields(question):
-        subject = marked(field.type, Subject)
+        subject = mark_of(field.type, Subject)
         if subject is not None:
             return field.name, subject
     return "", None
@@ -225,7 +227,7 @@ def options(question: type[Question]) -> Declared:
     """Return the options of a question by field."""
     found = {}
     for field in dataclasses.fields(question):
-        option = marked(field.type, Option)
+        option = mark_of(field.type, Option)
         if option is not None:
             found[field.name] = (option, plain_type(field.type), field.default)
     return found
@@ -238,15 +240,15 @@ def keyword_options(function: Callable | None) -> Declared:
     if function is None:
         return found
     for parameter in inspect.signature(function).parameters.values():
-        option = marked(parameter.annotation, Option)
+        option = mark_of(parameter.annotation, Option)
         if option is not None:
             kind = plain_type(parameter.annotation)
             found[parameter.name] = (option, kind, parameter.default)
     return found
 
 
-def marked(annotation: Any, kind: type) -> Any:
-    """Return what an annotation has of a kind; None without one."""
+def mark_of(annotation: Any, kind: type) -> Any:
+    """Return the mark of an annotation that is of a class; None without one."""
     for mark in getattr(annotation, "__metadata__", ()):
         if isinstance(mark, kind):
             return mark
@@ -258,8 +260,8 @@ def plain_type(annotation: Any) -> Any:
     return get_args(annotation)[0]
 
 
-def of_union(kind: Any) -> Any:
-    """Return the type of a value that may be left out, without None."""
+def without_none(kind: Any) -> Any:
+    """Return the type of an optional value, without None."""
     if get_origin(kind) in (Union, UnionType):
         return next(part for part in get_args(kind) if part is not type(None))
     return kind
@@ -307,7 +309,7 @@ def schema(question: type[Question]) -> dict[str, Any]:
 
 def json_type(kind: Any) -> dict[str, Any]:
     """Return the JSON Schema of a type; {} for any value."""
-    kind = of_union(kind)
+    kind = without_none(kind)
     named = JSON_TYPES.get(get_origin(kind) or kind)
     if named is None:
         return {}

@@ -1,29 +1,30 @@
-"""The curvature constraint function of a scene, and its integral over the scene's gait; of
-more than two joints its slices, where two joints move."""
+"""The curvature constraint function of a scene, and its integral over the scene's gait;
+of more than two joints its slices, where two joints move."""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from geomech.core.errors import choose
+from geomech.core.variables import POSE, Result
 from geomech.questions import loading, names, parsing, tools
 from geomech.questions.base import Option, Question, Run, Subject
 from geomech.questions.common import ColourLimit, OtherFrame, Pair, Panels, Slice
+from geomech.results.show import scalar, zero_reason, zeros
+from geomech.run.cost import Cost
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
-    from geomech.run.cost import Cost
     from geomech.scenes.model import Scene
     from geomech.studies.shape_space import Plan
 
 SIGN = "positive for counter-clockwise loops"
-POSE = ("x", "y", "heading")
 
 
 @dataclass(frozen=True)
 class Ccf(Question):
-    """Compute the CCF and its integral over the scene's gait. --plot draws both. Of three
-    and more joints: a slice for each pair, or for one, with the others fixed."""
+    """Compute the CCF and its integral over the scene's gait. --plot draws both. Of
+    three and more joints: a slice for each pair, or for one, with the others fixed."""
 
     scene: Annotated[
         "Scene", Subject(loading.load_scene, names.scene_names, ("grid", "extent"))
@@ -43,7 +44,7 @@ class Ccf(Question):
 
     def __post_init__(self) -> None:
         if self.slice is not None:
-            self._set(slice=tools.numbers(self.slice))
+            self._set(slice=tools.as_numbers(self.slice))
 
     @property
     def sliced(self) -> bool:
@@ -56,8 +57,9 @@ class Ccf(Question):
 
     @property
     def title(self) -> str:
-        what = "planes" if self.sliced else "field"
-        return f"{what} of {self.scene.name}"
+        if self.sliced:
+            return f"planes of {self.scene.name}"
+        return f"field of {self.scene.name}"
 
     @property
     def less(self) -> str:  # type: ignore[override]
@@ -100,7 +102,7 @@ class Ccf(Question):
             )
         self.plan.check()
 
-    def cost(self) -> "Cost":
+    def cost(self) -> Cost:
         return self.plan.cost()
 
     def check_draw(
@@ -111,7 +113,6 @@ class Ccf(Question):
         clim: Any = None,
     ) -> None:
         from geomech import plots
-        from geomech.core.errors import choose
 
         parsing.one_limit(clim, component)
         choose("``style``", style, plots.CCF_STYLES)
@@ -125,8 +126,7 @@ class Ccf(Question):
                 "``metric`` draws on a map", instead=f"drop ``style`` {style}"
             )
 
-    def compute(self, run: Run) -> "Result":
-        from geomech.core.variables import Result
+    def compute(self, run: Run) -> Result:
         from geomech.studies import fields, shape_space
         from geomech.studies.effort import units
         from geomech.systems.base import shape_labels
@@ -165,22 +165,23 @@ class Ccf(Question):
                 space.stretch, units(self.scene.system)["path_length"]
             )
         if space.other is not None:
-            other, error = space.other.curvature, space.other.curvature_error
-            found.append(fields.of_ccf(other, error, name="other_ccf"))
+            ccf = space.other.curvature
+            error = space.other.curvature_error
+            found.append(fields.of_ccf(ccf, error, name="other_ccf"))
         return Result("ccf", tuple(found), facts)
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
+    def headline(result: Result) -> list[str]:
         facts = result.attributes
         return [f"{facts['scene']}: CCF in the frame {facts['frame']}, {facts['sign']}"]
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         shown = [name for name in result if name.startswith("ccf")]
         return result.only(*shown)
 
     @staticmethod
-    def remarks(result: "Result") -> list[str]:
+    def remarks(result: Result) -> list[str]:
         lines = []
         if "zero_line_share" in result:
             lines.append(zero_line_words(result))
@@ -190,7 +191,7 @@ class Ccf(Question):
 
     @staticmethod
     def draw(
-        result: "Result",
+        result: Result,
         *,
         style: Annotated[
             str,
@@ -257,7 +258,7 @@ class Ccf(Question):
         return plots.ccf_figure(ccf, style=style, metric=metric, names=both, **options)
 
 
-def zero_line_words(result: "Result") -> str:
+def zero_line_words(result: Result) -> str:
     """Return where the x component of the CCF changes sign."""
     share = float(result["zero_line_share"])
     if share == 0:
@@ -276,10 +277,8 @@ def zero_line_words(result: "Result") -> str:
     return f"{words}, in {100 * share:.0f} % of directions"
 
 
-def integral_words(result: "Result") -> list[str]:
+def integral_words(result: Result) -> list[str]:
     """Return the displacement of the scene's gait by the area that it encloses."""
-    from geomech.results.show import scalar, zero_reason, zeros
-
     amplitude = float(result["gait_amplitude"])
     moved = []
     for name in POSE:

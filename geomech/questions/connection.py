@@ -7,14 +7,19 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+import numpy as np
+
+from geomech.core.errors import choose
+from geomech.core.summary import percent
+from geomech.core.variables import COMPONENTS, Result, Variable
+from geomech.io.files import note
 from geomech.questions import loading, names, parsing, tools
 from geomech.questions.base import Option, Question, Run, Subject
 from geomech.questions.common import ColourLimit, OtherFrame, Pair, Panels, Slice
+from geomech.run.cost import Cost
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
-    from geomech.run.cost import Cost
     from geomech.scenes.model import Scene
     from geomech.studies.scene_tables import SceneTables
     from geomech.studies.shape_space import Plan
@@ -24,7 +29,7 @@ SHOWN = ("A",)
 
 def write_table(
     path: Path,
-    result: "Result",
+    result: Result,
     *,
     sign: Annotated[
         str | None, Option("sign of A in a .mat file: + (the default) or -", "+|-")
@@ -43,7 +48,6 @@ def write_table(
 ) -> None:
     """Write the connection in a layout of sysplotter's, or in a format of a plug-in
     (`geomech.io.tables.FORMATS`)."""
-    from geomech.io.files import note
     from geomech.io.tables import FORMATS, LAYOUTS, SIGNS
 
     ending = path.suffix.lower()
@@ -56,7 +60,7 @@ def write_table(
         note(f"{path} has {SIGNS['+']}; ``sign`` - gives the other")
 
 
-def with_contents(result: "Result", ending: str, layout: str | None = None) -> "Result":
+def with_contents(result: Result, ending: str, layout: str | None = None) -> Result:
     """Return the result with all that a format has; what it lacks is computed again."""
     from geomech.io.tables import FORMATS
     from geomech.results.scenes import scene_of
@@ -73,8 +77,8 @@ def with_contents(result: "Result", ending: str, layout: str | None = None) -> "
 
 @dataclass(frozen=True)
 class Connection(Question):
-    """Compute the local connection on a grid. A NetCDF file has the fit residual and the
-    CCF, too; a .mat file has A and the metric, in a layout of sysplotter's."""
+    """Compute the local connection on a grid. A NetCDF file has the fit residual and
+    the CCF, too; a .mat file has A and the metric, in a layout of sysplotter's."""
 
     scene: Annotated[
         "Scene", Subject(loading.load_scene, names.scene_names, ("grid", "extent"))
@@ -92,7 +96,7 @@ class Connection(Question):
 
     def __post_init__(self) -> None:
         if self.slice is not None:
-            self._set(slice=tools.numbers(self.slice))
+            self._set(slice=tools.as_numbers(self.slice))
 
     @property
     def sliced(self) -> bool:
@@ -118,8 +122,10 @@ class Connection(Question):
         from geomech.studies.shape_space import Plan
 
         file = ""
-        if self.contents:
-            file = WHOLE if WHOLE in self.contents else self.contents[0]
+        if WHOLE in self.contents:
+            file = WHOLE
+        elif self.contents:
+            file = self.contents[0]
         return Plan(
             run.tables_of(self.scene),
             file,
@@ -134,14 +140,14 @@ class Connection(Question):
         from geomech.io.tables import FORMATS
         from geomech.studies import fields
 
-        wanted = []
+        found = []
         for path in paths:
             ending = path.suffix.lower()
             if ending in self.files() or ending == ".nc":
                 check_settings(self.scene, ending, options)
                 layout = options.get("layout")
-                wanted.append(fields.contents(FORMATS[ending], layout))
-        return replace(self, contents=tuple(dict.fromkeys(wanted)))
+                found.append(fields.contents(FORMATS[ending], layout))
+        return replace(self, contents=tuple(dict.fromkeys(found)))
 
     def for_picture(self, **options: Any) -> Question:
         return replace(self, drawn=True)
@@ -154,20 +160,18 @@ class Connection(Question):
             )
         self.plan.check()
 
-    def cost(self) -> "Cost":
+    def cost(self) -> Cost:
         return self.plan.cost()
 
     def check_draw(
         self, style: str = "quiver", component: Any = (), clim: Any = None
     ) -> None:
         from geomech import plots
-        from geomech.core.errors import choose
 
         parsing.one_limit(clim, component)
         choose("``style``", style, plots.CONNECTION_STYLES)
 
-    def compute(self, run: Run) -> "Result":
-        from geomech.core.variables import Result
+    def compute(self, run: Run) -> Result:
         from geomech.studies import fields, shape_space
 
         space = self._plan(run).compute(run.progress)
@@ -207,17 +211,17 @@ class Connection(Question):
         return {".mat": write_table}
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
+    def headline(result: Result) -> list[str]:
         facts = result.attributes
         about = f"local connection A, xi = A alphadot, in the frame {facts['frame']}"
         return [f"{facts['scene']}: {about}"]
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         return result.only(*SHOWN)
 
     @staticmethod
-    def remarks(result: "Result") -> list[str]:
+    def remarks(result: Result) -> list[str]:
         facts = result.attributes
         lines = [f"fit: {fit_words(result)}"]
         if "direction_share" in result:
@@ -225,13 +229,14 @@ class Connection(Question):
         if facts.get("symmetries"):
             lines += [f"symmetry: {one}" for one in facts["symmetries"].split("; ")]
         if "balances" in result and int(result["balances"].values):
-            balances, seconds = int(result["balances"].values), float(result["seconds"])
+            balances = int(result["balances"].values)
+            seconds = float(result["seconds"])
             lines.append(f"cost: {balances:,} force balances, {seconds:.2g} s")
         return lines
 
     @staticmethod
     def draw(
-        result: "Result",
+        result: Result,
         *,
         style: Annotated[
             str, Option("draw arrows (quiver, the default) or streamlines", "STYLE")
@@ -240,7 +245,8 @@ class Connection(Question):
         clim: ColourLimit = None,
         ax: Any = None,
     ) -> Any:
-        """Draw the rows of A as arrows or streamlines over shape space; return the Figure.
+        """Draw the rows of A as arrows or streamlines over shape space; return the
+        Figure.
 
         On Axes that are given draw one row, x by default; return the Axes."""
         from geomech import plots
@@ -275,7 +281,6 @@ class Connection(Question):
 
 def check_settings(scene: Any, ending: str, options: dict[str, Any]) -> None:
     """Refuse a file that cannot have what is asked of it."""
-    from geomech.core.errors import choose
     from geomech.io.tables import FORMATS, LAYOUTS, ORDERS, SIGNS
     from geomech.studies import fields
 
@@ -306,8 +311,6 @@ def check_settings(scene: Any, ending: str, options: dict[str, Any]) -> None:
 
 def cost_variables(balances: int, seconds: float) -> list[Any]:
     """Return what the computation took."""
-    from geomech.core.variables import Variable
-
     return [
         Variable("balances", (), balances, "1", "force balances that were solved"),
         Variable("seconds", (), seconds, "s", "of computing"),
@@ -335,10 +338,8 @@ def facts_of(tables: "SceneTables") -> dict[str, Any]:
 
 def direction_words(shares: Any) -> list[str]:
     """Return by how much more directions of alphadot change A."""
-    import numpy as np
-
     rows = []
-    for name, share in zip(["x", "y", "theta"], shares):
+    for name, share in zip(COMPONENTS, shares):
         if np.isfinite(share):
             rows.append(f"{name} {100 * share:.2g} %")
     if not rows:
@@ -347,20 +348,15 @@ def direction_words(shares: Any) -> list[str]:
     return [f"directions of alphadot: more of them change A by about {changes} (rms)"]
 
 
-def fit_words(result: "Result") -> str:
+def fit_words(result: Result) -> str:
     """Return what the linear fit leaves of the velocity."""
-    import numpy as np
-
     if result.attributes.get("exact_fit"):
         return "exact, xi is linear in alphadot"
     if "fit_share" not in result or np.isnan(result["fit_share"].values).all():
         return "fit residual unknown"
     parts = []
-    for name, share in zip(["x", "y", "theta"], result["fit_share"].values):
-        percent = "0 %"
-        if share > 1e-8:
-            percent = f"{100 * share:.2g} %"
-        parts.append(f"{name} {percent}")
+    for name, share in zip(COMPONENTS, result["fit_share"].values):
+        parts.append(f"{name} {percent(share)}")
     words = f"leaves {', '.join(parts)} of the rms of xi"
     singular = int(result["singular_shapes"].values)
     if singular:

@@ -1,32 +1,34 @@
-"""The net displacement of a gait per cycle: by each tier with its error, or by the cheapest
-that is accurate enough."""
+"""The net displacement of a gait per cycle: by each tier with its error, or by the
+cheapest that is accurate enough."""
 
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, cast
 
+import numpy as np
+
+from geomech.core.variables import POSE, Result, Variable
 from geomech.questions import loading, names, parsing, tools
 from geomech.questions.base import Option, Question, Run, Subject
 from geomech.questions.common import CurvePanels
+from geomech.results.numbers import size
+from geomech.run.cost import Cost
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
     from geomech.gaits import Gait
-    from geomech.run.cost import Cost
     from geomech.scenes.model import Scene
 
-POSE = ("x", "y", "heading")
 EFFORT = ("path_length", "work", "cost_of_transport")
-COMPARED = 4  # amplitudes up to which the other tiers' x is shown
+LARGEST_COMPARED = 4  # amplitudes up to which the other tiers' x is shown
 FRAME = "x ahead, y to the left, as the body frame points at the start of the cycle"
 
 
 @dataclass(frozen=True)
 class Displacement(Question):
-    """Compute the displacement of a gait by each tier. x, y and heading after a cycle from
-    phase t = 0, each with an estimated error."""
+    """Compute the displacement of a gait by each tier. x, y and heading after a cycle
+    from phase t = 0, each with an estimated error."""
 
     scene: Annotated[
         "Scene",
@@ -64,8 +66,8 @@ class Displacement(Question):
             amplitudes = getattr(self.gait or self.scene.gait, "amplitude", 1.0)
         tiers = self.tiers
         if tiers is not None:
-            tiers = tools.words(tiers)
-        self._set(amplitudes=tools.numbers(amplitudes), tiers=tiers)
+            tiers = tools.as_words(tiers)
+        self._set(amplitudes=tools.as_numbers(amplitudes), tiers=tiers)
 
     @property
     def values(self) -> Sequence[float]:
@@ -80,7 +82,7 @@ class Displacement(Question):
 
             refuse_costless(self.scene)
 
-    def cost(self) -> "Cost":
+    def cost(self) -> Cost:
         from geomech.studies import cost
 
         jobs = []
@@ -93,7 +95,7 @@ class Displacement(Question):
         # before each.
         return cost.price(jobs)
 
-    def compute(self, run: Run) -> "Result":
+    def compute(self, run: Run) -> Result:
         if self.tolerance is None:
             tables = run.tables_of(self.scene)
             found = tables.displacements(
@@ -107,7 +109,7 @@ class Displacement(Question):
             found = with_effort(found, self.scene, self.gait)
         return found
 
-    def _cheapest(self, run: Run) -> "Result":
+    def _cheapest(self, run: Run) -> Result:
         from geomech.studies import cost
         from geomech.studies.choose import cheapest
 
@@ -122,10 +124,10 @@ class Displacement(Question):
         return cheapest(self.scene, self.values, tolerance, self.gait, ask)
 
     def check_draw(self, component: Sequence[str] = (), data: Any = None) -> None:
-        points(data, self.scene, component)
+        measured_points(data, self.scene, component)
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
+    def headline(result: Result) -> list[str]:
         facts = result.attributes
         first = f"{facts['scene']}: displacement per cycle, {tier_words(result)}"
         lines = [first, f"amplitude: {amplitude_words(result)}; {FRAME}"]
@@ -134,16 +136,14 @@ class Displacement(Question):
         return lines
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         """Return the pose by the most exact tier, and x by the others."""
-        from geomech.core.variables import Variable
-
         index = exact_tier(result)
         tiers = result["tier"].values.tolist()
         shown = result.at(tier=tiers[index]).only(*POSE, "speed", *EFFORT)
         others = [name for name in tiers if name != tiers[index]]
-        few = result.sizes["amplitude"] <= COMPARED
-        if not others or result["x"].zero or not few:
+        is_short = result.sizes["amplitude"] <= LARGEST_COMPARED
+        if not others or result["x"].zero or not is_short:
             return without_undefined(shown)
         is_other = [name in others for name in tiers]
         x = tools.selected(result["x"], "tier", is_other)
@@ -152,10 +152,13 @@ class Displacement(Question):
         return without_undefined(shown).with_variables(coordinate, x)
 
     @staticmethod
-    def remarks(result: "Result") -> list[str]:
+    def remarks(result: Result) -> list[str]:
         facts = result.attributes
         lines = []
-        if result.sizes["amplitude"] > COMPARED and len(result["tier"].values) > 1:
+        if (
+            result.sizes["amplitude"] > LARGEST_COMPARED
+            and len(result["tier"].values) > 1
+        ):
             lines.append(errors_of_others(result))
         if "speed" in result:
             frequency = facts["frequency"]
@@ -169,7 +172,7 @@ class Displacement(Question):
 
     @staticmethod
     def draw(
-        result: "Result",
+        result: Result,
         *,
         component: CurvePanels = (),
         data: Annotated[
@@ -188,16 +191,16 @@ class Displacement(Question):
         if ax is not None:
             return plots.displacement(result, ax=ax, quantity=quantity, data=data)
         if isinstance(data, str):
-            data = points(data, scene_of(result), component)
+            data = measured_points(data, scene_of(result), component)
         name = result.attributes["scene"]
         return plots.displacement_figure(
             {name: result}, components=component, data=data
         )
 
 
-def points(data: Any, scene: Any, component: Sequence[str]) -> Any:
-    """Return measurements to be drawn: those of a file, which are of the quantity of one
-    panel, or values as they are."""
+def measured_points(data: Any, scene: Any, component: Sequence[str]) -> Any:
+    """Return measurements to be drawn: those of a file, which are of the quantity of
+    one panel, or values as they are."""
     from pathlib import Path
 
     from geomech.questions.texts import measurements
@@ -207,11 +210,9 @@ def points(data: Any, scene: Any, component: Sequence[str]) -> Any:
     return measurements(Path(data), scene, tuple(component))
 
 
-def without_undefined(result: "Result") -> "Result":
-    """Return the result without variables that are nothing but nan, such as the work of a
-    system that has none."""
-    import numpy as np
-
+def without_undefined(result: Result) -> Result:
+    """Return the result without variables that are nothing but nan, such as the work of
+    a system that has none."""
     undefined = []
     for v in result.variables:
         if v.values.dtype.kind == "f" and v.values.size and np.isnan(v.values).all():
@@ -219,18 +220,17 @@ def without_undefined(result: "Result") -> "Result":
     return result.without(*undefined)
 
 
-def exact_tier(result: "Result") -> int:
-    """Return the number of the tier whose largest error of position is least, the last of
-    several."""
-    import numpy as np
-
+def exact_tier(result: Result) -> int:
+    """Return the number of the tier whose largest error of position is least, the last
+    of several."""
     errors = np.nan_to_num(result["x"].error, nan=np.inf).max(1, initial=0.0)
     return len(errors) - 1 - int(errors[::-1].argmin())
 
 
-def tier_words(result: "Result") -> str:
+def tier_words(result: Result) -> str:
     """Return the name of the tier that is shown, and why it is this one."""
-    tiers, facts = result["tier"].values.tolist(), result.attributes
+    facts = result.attributes
+    tiers = result["tier"].values.tolist()
     name = tiers[exact_tier(result)]
     if "tolerance" in facts:
         return f"{name} tier, cheapest within {facts['tolerance']:g} BL"
@@ -239,28 +239,25 @@ def tier_words(result: "Result") -> str:
     return f"{name} tier"
 
 
-def amplitude_words(result: "Result") -> str:
+def amplitude_words(result: Result) -> str:
     """Return what an amplitude is, without the marks of formulas."""
     return re.sub(r"[$\\]", "", result["amplitude"].label)
 
 
-def errors_of_others(result: "Result") -> str:
+def errors_of_others(result: Result) -> str:
     """Return the largest errors of the tiers that are not shown."""
-    from geomech.results.numbers import size
-
     shown = exact_tier(result)
-    x, words = result["x"], []
+    x = result["x"]
+    words = []
     for k, tier in enumerate(result["tier"].values.tolist()):
         if k != shown:
             words.append(f"{tier} {size(float(x.error[k].max(initial=0.0)))}")
     return f"other tiers, largest error ({x.unit}): {', '.join(words)}"
 
 
-def shift_words(result: "Result") -> Iterable[str]:
-    """Yield how far uncertain media shift the mean of a quantity, where that matters."""
-    import numpy as np
-
-    from geomech.results.numbers import size
+def shift_words(result: Result) -> Iterable[str]:
+    """Yield how far uncertain media shift the mean of a quantity, where that
+    matters."""
     from geomech.studies.uncertainty import SEEN, SHIFTED
 
     length = result.attributes["body_length"]

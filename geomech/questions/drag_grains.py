@@ -5,13 +5,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from geomech.core.variables import Result
+from geomech.io.files import write_text
 from geomech.questions import parsing, tools
 from geomech.questions.base import Option, Question, Run
 from geomech.questions.common import Store
+from geomech.run.cost import Cost
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
-    from geomech.run.cost import Cost
     from geomech.studies.grains import DraggedRod
 
 SHOWN = ("mean_flank", "mean_ends", "mean_lift", "value", "end_caps")
@@ -30,30 +31,34 @@ COLUMNS = (
 )
 
 
-def write_drag(path: Path, result: "Result") -> None:
+def write_drag(path: Path, result: Result) -> None:
     """Write the file that ``fit-medium`` reads: a line for each bed and angle, with the
     drag of a flank as long as the rod."""
-    from geomech.io.files import write_text
-
     facts = result.attributes
     about = [facts["command"], *facts["drag_about"].splitlines()]
     lines = [f"# {line}" for line in about]
     lines.append(",".join(COLUMNS))
     length = float(result["rod_length"])
-    flank, ends, lift = result["flank"], result["ends"], result["lift"]
+    flank = result["flank"]
+    ends = result["ends"]
+    lift = result["lift"]
     for i, seed in enumerate(result["bed"].values):
         for j, psi in enumerate(result["attack_angle"].values):
-            here = (slice(None), i, j)
-            forces = [*(length * flank[here]), *ends[here], lift[i, j]]
-            errors = [*(length * flank.error[here]), *ends.error[here]]
+            index = (slice(None), i, j)
+            forces = [*(length * flank[index]), *ends[index], lift[i, j]]
+            errors = [*(length * flank.error[index]), *ends.error[index]]
             cells = [
                 f"{psi:g}",
-                *(f"{force:.4f}" for force in forces),
+                *map(newtons, forces),
                 f"{seed}",
-                *(f"{error:.4f}" for error in errors),
+                *map(newtons, errors),
             ]
             lines.append(",".join(cells))
     write_text(path, "\n".join(lines) + "\n")
+
+
+def newtons(force: float) -> str:
+    return f"{force:.4f}"
 
 
 @dataclass(frozen=True)
@@ -129,10 +134,10 @@ class DragGrains(Question):
         self.study.check()
         _ = self.store_folder  # refuses where there is none
 
-    def cost(self) -> "Cost":
+    def cost(self) -> Cost:
         return self.study.cost(self.store_folder)
 
-    def compute(self, run: Run) -> "Result":
+    def compute(self, run: Run) -> Result:
         result = self.study.answer(self.store_folder, run.progress)
         facts = {**result.attributes, "command": tools.command_line(self)}
         return replace(result, attributes=facts)
@@ -142,7 +147,7 @@ class DragGrains(Question):
         return {".csv": write_drag}
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
+    def headline(result: Result) -> list[str]:
         facts = result.attributes
         width = 1e3 * float(result["rod_diameter"])
         length = 1e3 * float(result["rod_length"])
@@ -157,21 +162,21 @@ class DragGrains(Question):
         ]
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         return result.only(*SHOWN)
 
     @staticmethod
-    def remarks(result: "Result") -> list[str]:
+    def remarks(result: Result) -> list[str]:
         overlap = float(result["largest_overlap"])
         return [
-            f"errors of drag: {result['mean_lift'].error_label}; of the law: half widths "
-            "of intervals with 95 %",
+            f"errors of drag: {result['mean_lift'].error_label}; of the law: half "
+            "widths of intervals with 95 %",
             f"largest overlap {overlap:.3f} grain diameters",
             "-o FILE.csv writes a file for 'geomech fit-medium'",
         ]
 
     @staticmethod
-    def draw(result: "Result") -> Any:
+    def draw(result: Result) -> Any:
         """Draw the drag on the flank with the fitted law, and the residuals; return the
         Figure."""
         from geomech import plots

@@ -1,5 +1,5 @@
-"""A measured gait: a log of joint angles gives the connection near its mean gait, tracked
-midlines the kinematics of a trial, beside those that a medium predicts."""
+"""A measured gait: a log of joint angles gives the connection near its mean gait,
+tracked midlines the kinematics of a trial, beside those that a medium predicts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -8,12 +8,14 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from geomech.core.variables import Result
+from geomech.io.files import write_text
 from geomech.questions import loading, logs, parsing, tools, trials
 from geomech.questions.base import Option, Question, Run, Subject
+from rft.core.checks import in_range
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
     from geomech.measured.log import Log
     from geomech.measured.midlines.trial import Trial
 
@@ -21,17 +23,16 @@ HELP = "table of joint angles, x, y, heading, or points of midlines"
 SCENE = ".toml"
 
 
-def write_scene(path: Path, result: "Result", *, field: Path | None = None) -> None:
-    """Write a scene of the mean gait of a log, which takes the connection from a file of
-    the result. field: that file; by default the one that the command writes, or of the
-    scene's name with the ending .nc."""
-    from geomech.io.files import write_text
+def write_scene(path: Path, result: Result, *, field: Path | None = None) -> None:
+    """Write a scene of the mean gait of a log, which takes the connection from a file
+    of the result. field: that file; by default the one that the command writes, or of
+    the scene's name with the ending .nc."""
     from geomech.results.measured import scene_text
 
-    asked = getattr(result.question, "connection_file", None)
+    written = getattr(result.question, "connection_file", None)
     if field is None:
-        field = asked or path.with_suffix(".nc")
-    if field != asked and not field.exists():
+        field = written or path.with_suffix(".nc")
+    if field != written and not field.exists():
         raise Refusal(
             f"there is no {field}",
             because="a scene of a mean gait takes its connection from a file",
@@ -42,10 +43,11 @@ def write_scene(path: Path, result: "Result", *, field: Path | None = None) -> N
 
 @dataclass(frozen=True)
 class FitGait(Question):
-    """Fit a measured gait. A log of joint angles gives the connection near its mean gait,
-    with intervals; tracked midlines give speed, heading, slip, wave efficiency, amplitude
-    and wavelength, each with an interval, and in a medium the same as predicted. -o
-    FIELD.nc -o SCENE.toml writes the connection and a scene of the mean gait."""
+    """Fit a measured gait. A log of joint angles gives the connection near its mean
+    gait, with intervals; tracked midlines give speed, heading, slip, wave efficiency,
+    amplitude and wavelength, each with an interval, and in a medium the same as
+    predicted. -o FIELD.nc -o SCENE.toml writes the connection and a scene of the mean
+    gait."""
 
     file: Annotated[
         "str | Path | Log | Trial",
@@ -114,7 +116,7 @@ class FitGait(Question):
     table: ClassVar[tuple[str, ...]] = ("cycle",)
 
     def __post_init__(self) -> None:
-        self._set(columns=tools.words(self.columns), effects=tuple(self.effects))
+        self._set(columns=tools.as_words(self.columns), effects=tuple(self.effects))
 
     @property
     def path(self) -> Path | None:
@@ -124,7 +126,9 @@ class FitGait(Question):
         return None
 
     def inputs(self) -> list[Path]:
-        found = [self.path] if self.path else []
+        found = []
+        if self.path is not None:
+            found.append(self.path)
         if isinstance(self.medium, str | Path) and Path(self.medium).is_file():
             found.append(Path(self.medium))
         return found
@@ -137,8 +141,10 @@ class FitGait(Question):
                 f"{scenes[0]} takes the connection from one file",
                 instead="say -o FIELD.nc, too",
             )
-        taken = fields[0] if scenes else None
-        return replace(self, mapped=bool(paths), connection_file=taken)
+        connection_file = None
+        if scenes:
+            connection_file = fields[0]
+        return replace(self, mapped=bool(paths), connection_file=connection_file)
 
     @cached_property
     def form(self) -> str:
@@ -152,15 +158,13 @@ class FitGait(Question):
         )
 
     def check(self) -> None:
-        from rft.core.checks import in_range
-
         if self.body_length is not None:
             in_range("``body_length``", self.body_length, 1e-9, 1e9)
         _ = self.form  # refuses options of the other
-        _ = self.known_medium
+        _ = self.loaded_medium
 
     @cached_property
-    def known_medium(self) -> Any:
+    def loaded_medium(self) -> Any:
         """The medium of a prediction; None without one."""
         from geomech.scenes.read import medium_of
 
@@ -168,24 +172,24 @@ class FitGait(Question):
             return medium_of(self.medium)
         return self.medium
 
-    def compute(self, run: Run) -> "Result":
+    def compute(self, run: Run) -> Result:
         if self.form == "log":
             return self._of_log()
         return self._of_midlines()
 
-    def _of_log(self) -> "Result":
+    def _of_log(self) -> Result:
         from geomech.measured.fit import fit_log
-        from geomech.measured.results import of_fit
+        from geomech.measured.results import fit_result
 
         names = ("columns", "degrees", "level", "harmonics", "limits", "body_length")
         log: Any = self.file
         given = {name: getattr(self, name) for name in names}
-        return of_fit(fit_log(log, **given), self.mapped)
+        return fit_result(fit_log(log, **given), self.mapped)
 
-    def _of_midlines(self) -> "Result":
+    def _of_midlines(self) -> Result:
         from geomech.measured.midlines.fit import fit_midlines
         from geomech.measured.midlines.predicted import compare
-        from geomech.measured.midlines.results import of_trial
+        from geomech.measured.midlines.results import trial_result
 
         names = (
             "columns", "units", "scale", "fps", "y", "head", "least_score",
@@ -194,15 +198,15 @@ class FitGait(Question):
         midlines: Any = self.file
         given = {name: getattr(self, name) for name in names}
         fit = fit_midlines(midlines, **given)
-        if self.known_medium is None:
-            return of_trial(fit)
-        return of_trial(fit, compare(fit, self.known_medium, tuple(self.effects)))
+        if self.loaded_medium is None:
+            return trial_result(fit)
+        return trial_result(fit, compare(fit, self.loaded_medium, tuple(self.effects)))
 
-    def answer(self, run: Run) -> "Result":
+    def answer(self, run: Run) -> Result:
         # Measurements have a name, and are no scene.
         return replace(self.compute(run), question=self)
 
-    def ask(self, tables: Any = None) -> "Result":
+    def ask(self, tables: Any = None) -> Result:
         result = super().ask(tables)
         tools.warn_of_notes(result)
         return result
@@ -212,19 +216,19 @@ class FitGait(Question):
         return {SCENE: write_scene}
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
+    def headline(result: Result) -> list[str]:
         return presenting(result).headline(result)
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         return presenting(result).summary(result)
 
     @staticmethod
-    def remarks(result: "Result") -> list[str]:
+    def remarks(result: Result) -> list[str]:
         return presenting(result).remarks(result)
 
     @staticmethod
-    def draw(result: "Result") -> Any:
+    def draw(result: Result) -> Any:
         """Draw the mean gait, the connection along it and its cycles; or the way of the
         body, slip and amplitude along it, and the prediction. Return the Figure."""
         from geomech import plots
@@ -234,7 +238,7 @@ class FitGait(Question):
         return plots.midlines_figure(result)
 
 
-def presenting(result: "Result") -> ModuleType:
+def presenting(result: Result) -> ModuleType:
     """Return the module with the words for what was measured."""
     if result.attributes["form"] == "log":
         return logs

@@ -1,23 +1,25 @@
-"""A medium fitted to measured drag: a force law from a rod, a stress map from plates, or
-the strength of one from a plate that is pushed straight down."""
+"""A medium fitted to measured drag: a force law from a rod, a stress map from plates,
+or the strength of one from a plate that is pushed straight down."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
+from geomech.core.variables import Result
+from geomech.io.files import write_text
 from geomech.questions import loading, names, parsing, tools
 from geomech.questions.base import Option, Question, Run, Subject
 
-if TYPE_CHECKING:
-    from geomech.core.variables import Result
-
 HELP = "CSV file, or short-rod-drag or flank-drag, samples that ship"
 SIZES = ("radius", "length", "depth", "density", "area")
-MAP, STRENGTH = "stress-map", "zeta"  # laws of the vertical plane
-FEW = 10  # measurements that are shown beside the fit
+# Laws of the vertical plane.
+MAP = "stress-map"
+STRENGTH = "zeta"
+LARGEST_SHOWN = 10  # measurements that are shown beside the fit
 OF_ROD = ("axial_force", "axial_stress", "rms", "repeats_rms")
-ROWS = {  # columns of the shown measurements, and the component that they are of
+# By the columns of shown measurements: their variable, and its component.
+ROWS = {
     "along": ("force", "parallel"),
     "law_along": ("fitted", "parallel"),
     "across": ("force", "perpendicular"),
@@ -31,10 +33,8 @@ DRAGS = {
 }
 
 
-def write_medium(path: Path, result: "Result") -> None:
+def write_medium(path: Path, result: Result) -> None:
     """Write the medium as a file for scenes."""
-    from geomech.io.files import write_text
-
     write_text(path, result.attributes["medium_toml"])
 
 
@@ -42,8 +42,9 @@ def write_medium(path: Path, result: "Result") -> None:
 class FitMedium(Question):
     """Fit a medium to your own drag data. Rods, with the columns psi_deg, F_parallel_N,
     F_perpendicular_N, give a force law; plates in the vertical plane, with beta, gamma,
-    alpha_x, alpha_z (degrees, N/cm^3), nine coefficients; a plate that is pushed straight
-    down, with depth_m, force_N, the factor zeta. -o FILE.toml writes the medium."""
+    alpha_x, alpha_z (degrees, N/cm^3), nine coefficients; a plate that is pushed
+    straight down, with depth_m, force_N, the factor zeta. -o FILE.toml writes the
+    medium."""
 
     drag: Annotated[
         str, Subject(loading.as_typed, names.drag_names, (), "DRAG.csv", HELP)
@@ -101,14 +102,14 @@ class FitMedium(Question):
     def check(self) -> None:
         _ = self.chosen_law  # refuses an unknown one
 
-    def compute(self, run: Run) -> "Result":
+    def compute(self, run: Run) -> Result:
         from geomech.studies import calibration
 
         given = {name: getattr(self, name) for name in SIZES}
         sizes = {name: size for name, size in given.items() if size is not None}
         return calibration.answer(self.drag, self.chosen_law, sizes, self.end_caps)
 
-    def ask(self, tables: Any = None) -> "Result":
+    def ask(self, tables: Any = None) -> Result:
         result = super().ask(tables)
         tools.warn_of_notes(result)
         return result
@@ -118,8 +119,9 @@ class FitMedium(Question):
         return {".toml": write_medium}
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
-        facts, law = result.attributes, result.attributes["law"]
+    def headline(result: Result) -> list[str]:
+        facts = result.attributes
+        law = facts["law"]
         name = facts["file"]
         if law == MAP:
             return [f"stress map fitted to {name}: {facts['drags']} plate drags"]
@@ -131,23 +133,23 @@ class FitMedium(Question):
         return [f"{law} law fitted to {name}: {size}"]
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         law = result.attributes["law"]
         if law == MAP:
             shown = result.only("value", "share_from_data", "generic", "zeta", "rms")
             return with_rows(shown, result, ("beta", "gamma"), DRAGS)
         if law == STRENGTH:
             shown = result.only("value", "downward_stress", "rms")
-            if result["depth"].values.size <= FEW:
+            if result["depth"].values.size <= LARGEST_SHOWN:
                 rows = result.only("depth", "force", "fitted").variables
                 shown = shown.with_variables(*rows)
             return shown
         parameters = result["parameter"].values.tolist()
-        known = [name for name in OF_ROD if name not in parameters]
-        return with_rows(result.only("value", *known), result, ("psi",), ROWS)
+        others = [name for name in OF_ROD if name not in parameters]
+        return with_rows(result.only("value", *others), result, ("psi",), ROWS)
 
     @staticmethod
-    def remarks(result: "Result") -> list[str]:
+    def remarks(result: Result) -> list[str]:
         law = result.attributes["law"]
         lines = ["errors are half widths of intervals with 95 %"]
         if law == MAP:
@@ -166,7 +168,7 @@ class FitMedium(Question):
         ]
 
     @staticmethod
-    def draw(result: "Result") -> Any:
+    def draw(result: Result) -> Any:
         """Draw the measurements with the fit, and the residuals; return the Figure."""
         from geomech import plots
 
@@ -179,14 +181,14 @@ class FitMedium(Question):
 
 
 def with_rows(
-    shown: "Result",
-    result: "Result",
+    shown: Result,
+    result: Result,
     places: tuple[str, ...],
     columns: dict[str, tuple[str, str]],
-) -> "Result":
+) -> Result:
     """Return what is shown with a few measurements and the fit to them, side by side;
-    many are left out. places: variables that stand before them."""
-    if result[places[0]].values.size > FEW:
+    more than `LARGEST_SHOWN` are left out. places: variables before them."""
+    if result[places[0]].values.size > LARGEST_SHOWN:
         return shown
     rows = [result[name] for name in places]
     for column, (name, component) in columns.items():
@@ -195,16 +197,16 @@ def with_rows(
     return shown.with_variables(*rows)
 
 
-def undetermined_words(result: "Result") -> list[str]:
-    """Return which coefficients the data do not settle; [] if they settle all."""
+def undetermined_words(result: Result) -> list[str]:
+    """Return which coefficients the data leave undetermined; [] if none."""
     missing = result["parameter"].values[result["undetermined"].values > 0]
     if not missing.size:
         return []
     return [f"not determined by these drags: {', '.join(missing)}"]
 
 
-def rod_words(result: "Result") -> list[str]:
-    """Return what is known of the rod's ends and sizes, and what is lacking."""
+def rod_words(result: Result) -> list[str]:
+    """Return the rod's ends and sizes, and the sizes that are missing."""
     ends = float(result["end_caps"])
     caps = "left out"
     if ends:

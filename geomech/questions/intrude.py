@@ -1,14 +1,17 @@
 """Force and moment of grains on a body that is moved through them."""
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+import numpy as np
+
+from geomech.core.variables import Result
 from geomech.questions import loading, names
 from geomech.questions.base import Question, Run, Subject
+from geomech.run.cost import Cost
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
-    from geomech.run.cost import Cost
     from geomech.scenes.intruding import Intruding
 
 ROUNDING = 1e-12  # over the largest force or moment
@@ -16,8 +19,8 @@ ROUNDING = 1e-12  # over the largest force or moment
 
 @dataclass(frozen=True)
 class Intrude(Question):
-    """Compute force and moment of grains on a moving body. The body is an outline in the
-    vertical plane or a mesh. SI units."""
+    """Compute force and moment of grains on a moving body. The body is an outline in
+    the vertical plane or a mesh. SI units."""
 
     scene: Annotated["Intruding", Subject(loading.load_intruder, names.intruder_names)]
 
@@ -25,18 +28,18 @@ class Intrude(Question):
     table: ClassVar[tuple[str, ...]] = ("t",)
     unlimited: ClassVar[bool] = True  # it takes seconds at most
 
-    def cost(self) -> "Cost":
+    def cost(self) -> Cost:
         from geomech.studies import intrusion
 
         return intrusion.cost(self.scene)
 
-    def compute(self, run: Run) -> "Result":
+    def compute(self, run: Run) -> Result:
         from geomech.studies import intrusion
 
         return intrusion.answer(self.scene)
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
+    def headline(result: Result) -> list[str]:
         facts = result.attributes
         lines = [f"{facts['scene']}: {facts['about']}"]
         if "matched" in facts:
@@ -46,12 +49,13 @@ class Intrude(Question):
         return lines
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         return result.only()
 
     @staticmethod
-    def remarks(result: "Result") -> list[str]:
-        work, power = float(result["work"]), float(result["largest_power"])
+    def remarks(result: Result) -> list[str]:
+        work = float(result["work"])
+        power = float(result["largest_power"])
         return [
             *extreme_lines(result),
             f"error    {error_words(result)}",
@@ -60,7 +64,7 @@ class Intrude(Question):
         ]
 
     @staticmethod
-    def draw(result: "Result") -> Any:
+    def draw(result: Result) -> Any:
         """Draw the body, and force and moment along its motion; return the Figure."""
         from geomech import plots
         from geomech.results.scenes import scene_of
@@ -68,29 +72,26 @@ class Intrude(Question):
         return plots.intrusion_figure(scene_of(result), result)
 
 
-def loads(result: "Result") -> list[str]:
-    """Return the names of forces and moments that are shown."""
+def loads(result: Result) -> list[str]:
+    """Return the names of the forces and moments of a result; in three dimensions the
+    components of the moment in place of its size."""
     names = [name for name in result if name.startswith(("force", "moment"))]
     if "moment_y" in names:
         names.remove("moment")
     return names
 
 
-def place_of(result: "Result") -> str:
+def place_of(result: Result) -> str:
     """Return the name of the coordinate along which the body moves most."""
-    import numpy as np
-
     if "angle" in result:
         return "angle"
     places = [name for name in "xyz" if name in result]
     return max(places, key=lambda name: np.ptp(result[name].values))
 
 
-def extreme_lines(result: "Result") -> list[str]:
+def extreme_lines(result: Result) -> list[str]:
     """Return the least and the largest value of each force and moment with their
     places."""
-    import numpy as np
-
     names = loads(result)
     largest = dict.fromkeys(("force", "moment"), 0.0)
     for name in names:
@@ -99,34 +100,38 @@ def extreme_lines(result: "Result") -> list[str]:
         largest[kind] = max(largest[kind], size)
     lines = []
     for name in names:
-        values, unit = result[name].values, result[name].unit
+        values = result[name].values
+        unit = result[name].unit
         kind = name.partition("_")[0]
-        low, high = values.argmin(), values.argmax()
-        span = f"{values[low] + 0.0:.4g} at {place_words(result, low)}"
-        to = f"to {values[high] + 0.0:.4g} at {place_words(result, high)}"
+        least = value_words(result, name, values.argmin())
+        greatest = value_words(result, name, values.argmax())
         if np.abs(values).max() < ROUNDING * largest[kind]:
             lines.append(f"{name:8} zero to rounding")
         elif np.ptp(values) < ROUNDING * largest[kind]:
             lines.append(f"{name:8} {values[0]:.4g} {unit} throughout")
         else:
-            lines.append(f"{name:8} {span}, {to} ({unit})")
+            lines.append(f"{name:8} {least}, to {greatest} ({unit})")
     return lines
 
 
-def place_words(result: "Result", index: int) -> str:
-    """Return the place of the body at a step."""
-    import math
+def value_words(result: Result, name: str, index: int) -> str:
+    """Return a force or a moment at a step, with the place of the body."""
+    value = float(result[name].values[index])
+    return f"{value + 0.0:.4g} at {place_words(result, index)}"
 
+
+def place_words(result: Result, index: int) -> str:
+    """Return the place of the body at a step."""
     name = place_of(result)
-    value, unit = float(result[name].values[index]), result[name].unit
+    value = float(result[name].values[index])
+    unit = result[name].unit
     if name == "angle":
-        value, unit = math.degrees(value), "degrees"
+        value = math.degrees(value)
+        unit = "degrees"
     return f"{name} = {value + 0.0:.4g} {unit}"
 
 
-def error_words(result: "Result") -> str:
-    import math
-
+def error_words(result: Result) -> str:
     force = float(result["largest_force_error"])
     moment = float(result["largest_moment_error"])
     parts = result.attributes["parts"]

@@ -1,32 +1,27 @@
 """The words for results of logs of joint angles."""
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from geomech.core.variables import POSE, Result, Variable
 from geomech.questions import tools
 
-if TYPE_CHECKING:
-    from geomech.core.variables import Result
-
-POSE = ("x", "y", "heading")
 QUALITY = ("difference", "scatter")  # by component
 
 
-def headline(result: "Result") -> list[str]:
+def headline(result: Result) -> list[str]:
     facts = result.attributes
-    irregular, frequency = float(result["phase_residual"]), float(result["frequency"])
+    frequency = float(result["frequency"])
+    residual = float(result["phase_residual"])
     cycles = f"{facts['cycles']} whole cycles of {facts['columns']}"
     return [
         f"{facts['file']}: {cycles}, {frequency:.6g} per unit of t",
-        f"phase within {irregular:.2g} rad of a uniform run through each",
+        f"phase within {residual:.2g} rad of a uniform run through each",
         f"displacement per cycle, with intervals of {facts['level']:.3g} of cases:",
     ]
 
 
-def summary(result: "Result") -> "Result":
+def summary(result: Result) -> Result:
     """Return the displacements as logged and as predicted, side by side."""
-    from geomech.core.variables import Variable
-
     predicted = [f"{name}_predicted" for name in POSE]
     shown = [
         Variable("pose", ("pose",), POSE),
@@ -38,16 +33,19 @@ def summary(result: "Result") -> "Result":
     return result.only().with_variables(*shown)
 
 
-def remarks(result: "Result") -> list[str]:
-    count, reach = int(result["harmonics"].values), result["reach_along"].values
-    word = "harmonic" if count == 1 else "harmonics"
+def remarks(result: Result) -> list[str]:
+    count = int(result["harmonics"].values)
+    harmonics = "1 harmonic"
+    if count != 1:
+        harmonics = f"{count} harmonics"
+    reach = result["reach_along"].values
     parts = []
     for name, share in zip(POSE, result["explained"].values):
         parts.append(f"{name} {100 * share:.3g} %")
     return [
         "difference: rms of logged and predicted cycles; scatter: of the logged ones",
         f"explained of the body velocity: {', '.join(parts)}",
-        f"connection: {count} {word} in the phase; the data reach {reach.min():.3g} to "
+        f"connection: {harmonics} in the phase; the data reach {reach.min():.3g} to "
         f"{reach.max():.3g} rad from the mean gait",
         f"status: {result.attributes['status']}",
     ]

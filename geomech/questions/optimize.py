@@ -6,42 +6,42 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from geomech.core.variables import Result
+from geomech.io.files import write_text
 from geomech.questions import loading, names, parsing
 from geomech.questions.base import Option, Question, Run, Subject
 from geomech.questions.common import ColourLimit
+from geomech.results.show import scalar
+from geomech.run.cost import Cost
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
     from geomech.optimisation.request import Request
-    from geomech.run.cost import Cost
     from geomech.scenes.model import Scene
 
 SHOWN = ("x", "y", "heading", "path_length", "work", "frequency")
 ANSWERS = ("answer", "answer_value", "answer_starts", "answer_how")
-COMMENT = 86  # characters of a line above the scene
-SAME = 1e-12  # relative: a value that is no better
+COMMENT_WIDTH = 86  # characters of a line above the scene
+BETTER = 1e-12  # relative difference from which on a value is better
 
 
-def write_scene(path: Path, result: "Result") -> None:
+def write_scene(path: Path, result: Result) -> None:
     """Write the scene with the best gait, behind a comment with its value."""
-    from geomech.io.files import write_text
-
     if "best_scene_toml" not in result.attributes:
         raise Refusal(
             "the scene has parts that no file can name",
             instead="write the result to another format, such as .nc",
         )
     first, second, *_ = Optimize.headline(result)
-    about = textwrap.wrap(f"{first} ({second})", COMMENT)
+    about = textwrap.wrap(f"{first} ({second})", COMMENT_WIDTH)
     comment = "".join(f"# {line}\n" for line in about)
     write_text(path, f"{comment}\n{result.attributes['best_scene_toml']}")
 
 
 @dataclass(frozen=True)
 class Optimize(Question):
-    """Find the best gait for an objective. Its value has an error; -o FILE.toml writes it
-    as a scene, --plot draws its loop on the CCF."""
+    """Find the best gait for an objective. Its value has an error; -o FILE.toml writes
+    it as a scene, --plot draws its loop on the CCF."""
 
     scene: Annotated["Scene", Subject(loading.load_scene, names.scene_names)]
     objective: Annotated[
@@ -71,7 +71,8 @@ class Optimize(Question):
     power: Annotated[
         float | None, Option("largest mean power in drag x BL/s, for speed", "POWER")
     ] = None
-    # Whether the CCF that the gait gains is computed, and the stretched one: for pictures.
+    # For pictures: whether the CCF that the gait gains is computed, and the stretched
+    # one.
     mapped: bool = field(default=True, kw_only=True, compare=False)
     stretched: bool = field(default=False, kw_only=True, compare=False)
 
@@ -98,8 +99,8 @@ class Optimize(Question):
         )
 
     def for_files(self, paths: list[Path], options: dict[str, Any]) -> Question:
-        kept = [path for path in paths if path.suffix != ".toml"]
-        return replace(self, mapped=bool(kept))
+        results = [path for path in paths if path.suffix != ".toml"]
+        return replace(self, mapped=bool(results))
 
     def for_picture(self, stretch: bool = False, **options: Any) -> Question:
         return replace(self, mapped=True, stretched=stretch)
@@ -111,11 +112,10 @@ class Optimize(Question):
         if self.stretched:
             check_stretch(self.scene)
 
-    def cost(self) -> "Cost":
+    def cost(self) -> Cost:
         return self.request.cost()
 
-    def compute(self, run: Run) -> "Result":
-        from geomech.core.variables import Result
+    def compute(self, run: Run) -> Result:
         from geomech.optimisation import search, variables
         from geomech.studies.effort import units
         from geomech.studies.fields import of_stretch
@@ -137,30 +137,29 @@ class Optimize(Question):
         return {".toml": write_scene}
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
-        from geomech.results.show import scalar
-
-        facts, value = result.attributes, result["value"]
-        sought = facts["objective"]
+    def headline(result: Result) -> list[str]:
+        facts = result.attributes
+        value = result["value"]
+        objective = facts["objective"]
         if "direction" in facts:
-            sought = f"{sought} along {facts['direction']}"
+            objective = f"{objective} along {facts['direction']}"
         lines = [
-            f"{facts['scene']}: best {sought} {scalar(value)}",
+            f"{facts['scene']}: best {objective} {scalar(value)}",
             f"the scene's gait: {scalar(result['start_value'])}",
         ]
-        if float(value) <= float(result["start_value"]) * (1 + SAME):
+        if float(value) <= float(result["start_value"]) * (1 + BETTER):
             lines.append("nothing better than the scene's own gait was found")
         return lines
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         shown: tuple[str, ...] = SHOWN
         if result.attributes["starts"] > 1:
             shown = (*SHOWN, *ANSWERS)
         return result.only(*shown)
 
     @staticmethod
-    def remarks(result: "Result") -> list[str]:
+    def remarks(result: Result) -> list[str]:
         facts = result.attributes
         lines = []
         if "largest_rate" in facts:
@@ -172,7 +171,8 @@ class Optimize(Question):
         touched = "none"
         if "limit_touched" in result:
             touched = ", ".join(result["limit_touched"].values.tolist())
-        cycles, seconds = int(result["evaluations"].values), float(result["seconds"])
+        cycles = int(result["evaluations"].values)
+        seconds = float(result["seconds"])
         return [
             *lines,
             f"limits touched: {touched}",
@@ -181,7 +181,7 @@ class Optimize(Question):
 
     @staticmethod
     def draw(
-        result: "Result",
+        result: Result,
         *,
         stretch: Annotated[
             bool, Option("draw it also where equal lengths take equal effort")

@@ -1,12 +1,13 @@
-"""Values of options from the texts of a command line: functions of a text, the question's
-subject, and the option as it is typed.
+"""Values of options from the texts of a command line.
 
-`texts.py` reads the texts; these know the scene.
+Each function takes a text, the question's subject and the option as it is typed
+(`geomech.questions.base.Option.parse`); `texts.py` reads the texts.
 """
 
 from pathlib import Path
 from typing import Any
 
+from geomech.core.errors import choose
 from geomech.questions import texts
 from rft.core.refusal import Refusal
 
@@ -15,15 +16,16 @@ FORCE_PANELS = ("forward", "normal", "tangential", "power", "moment", "phase", "
 
 def amplitudes(text: str, scene: Any, flag: str) -> tuple[float, ...]:
     """Return the amplitudes in 0.5,1,30deg or START:STOP:COUNT."""
-    return tuple(texts.spread(flag, text, texts.amplitude_kind(scene)))
+    no_degrees = texts.no_degrees_of_amplitude(scene)
+    return tuple(texts.spread(flag, text, no_degrees))
 
 
 def tiers(text: str, scene: Any, flag: str) -> tuple[str, ...]:
     """Return the names in path,direct."""
-    from geomech.core.errors import choose
     from geomech.tiers import TIERS
 
-    return tuple(choose("``tiers``", name.strip(), TIERS) for name in text.split(","))
+    words = [word.strip() for word in text.split(",")]
+    return tuple(choose("``tiers``", word, TIERS) for word in words)
 
 
 def angles(text: str, scene: Any, flag: str) -> tuple[float, ...] | None:
@@ -33,7 +35,7 @@ def angles(text: str, scene: Any, flag: str) -> tuple[float, ...] | None:
 
 def angle(text: str, subject: Any, flag: str) -> float:
     """Return the angle 0.3 or 20deg, rad."""
-    return texts.numbers(flag, text, 1, None)[0]
+    return texts.parse_numbers(flag, text, 1, None)[0]
 
 
 def joint_limits(text: str, scene: Any, flag: str) -> Any:
@@ -80,13 +82,6 @@ def one_limit(limit: Any, panels: Any) -> None:
 def end_caps(text: str, subject: Any, flag: str) -> float | str:
     """Return e of the rod's ends, 0 to leave them out, or "fitted"."""
     return texts.parse_end_caps(text)
-
-
-def path(text: str, subject: Any, flag: str) -> Any:
-    """Return the path of a file."""
-    from pathlib import Path
-
-    return Path(text)
 
 
 def degrees(text: str, subject: Any, flag: str) -> tuple[float, ...]:

@@ -1,28 +1,32 @@
-"""All of a scene into a folder: connection, CCF, and displacements against amplitude, as
-numbers and pictures."""
+"""All of a scene into a folder: connection, CCF, and displacements against amplitude,
+as numbers and pictures."""
 
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from geomech.core.variables import Result
+from geomech.io.files import read, refuse_inputs, write_text
 from geomech.questions import base, loading, names, parsing
 from geomech.questions.base import Option, Question, Subject
 from geomech.questions.common import ColourLimit, Panels
 from geomech.questions.displacement import (
     Displacement,
     amplitude_words,
-    points,
+    measured_points,
     tier_words,
 )
+from geomech.run.cost import Cost
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
-    from geomech.run.cost import Cost
     from geomech.scenes.model import Scene
 
-SCENE, TABLES, FIELD = "scene.toml", "displacement.json", "connection.nc"
+# Files of the folder.
+SCENE = "scene.toml"
+TABLES = "displacement.json"
+FIELD = "connection.nc"
 FIGURES = (".png", ".pdf")
 DEFAULT = "three-link-glass"
 HELP = "built-in name or TOML file"
@@ -63,7 +67,7 @@ class Run(Question):
             refuse_folder(self.scene, path)
         return self
 
-    def cost(self) -> "Cost":
+    def cost(self) -> Cost:
         from geomech.studies import report
 
         return report.cost(self.scene)
@@ -72,15 +76,15 @@ class Run(Question):
         self, component: Any = (), clim: Any = None, data: Any = None
     ) -> None:
         parsing.one_limit(clim, component)
-        points(data, self.scene, component)
+        measured_points(data, self.scene, component)
 
-    def compute(self, run: base.Run) -> "Result":
+    def compute(self, run: base.Run) -> Result:
         from geomech.studies import report
 
         return report.answer(run.tables_of(self.scene), run.shown_progress)
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
+    def headline(result: Result) -> list[str]:
         """Return what the tables are: of the scene's own gait first."""
         from geomech.studies.report import tables_of
 
@@ -94,7 +98,7 @@ class Run(Question):
         return lines
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         """Return what is shown first of the displacements of each gait."""
         from geomech.studies.report import is_own, prefixed, tables_of
 
@@ -106,41 +110,40 @@ class Run(Question):
         return replace(result, variables=tuple(variables))
 
     @staticmethod
-    def remarks(result: "Result") -> list[str]:
+    def remarks(result: Result) -> list[str]:
         from geomech.studies.report import tables_of
 
         (_, own), *others = tables_of(result).items()
         lines = Displacement.remarks(own)
         for gait, table in others:
-            told = Displacement.remarks(table)
-            lines += [f"{gait}: {line}" for line in told if line not in lines]
+            remarks = Displacement.remarks(table)
+            lines += [f"{gait}: {line}" for line in remarks if line not in lines]
         return lines
 
     @staticmethod
-    def draw(result: "Result", *, component: Panels = (), data: Data = None) -> Any:
+    def draw(result: Result, *, component: Panels = (), data: Data = None) -> Any:
         """Draw displacements against amplitude, a row a gait; return the Figure."""
         from geomech import plots
         from geomech.results.scenes import scene_of
         from geomech.studies.report import tables_of
 
         if isinstance(data, str):
-            data = points(data, scene_of(result), component)
+            data = measured_points(data, scene_of(result), component)
         return plots.displacement_figure(
             tables_of(result), components=component, data=data
         )
 
     @staticmethod
     def fill(
-        result: "Result",
+        result: Result,
         folder: Path,
         *,
         component: Panels = (),
         clim: ColourLimit = None,
         data: Data = None,
     ) -> None:
-        """Write the scene, the displacements and the connection with their pictures into
-        a folder."""
-        from geomech.io.files import write_text
+        """Write the scene, the displacements and the connection with their pictures
+        into a folder."""
         from geomech.results.files import save
         from geomech.results.scenes import scene_of
         from geomech.scenes.write import toml
@@ -156,9 +159,9 @@ class Run(Question):
         write_text(folder / SCENE, toml(scene_of(result)))
 
 
-def save_maps(result: "Result", folder: Path, component: Any, clim: Any) -> None:
-    """Draw the connection and the CCF, of three joints for every pair, and the frame that
-    was chosen, if it is one of those."""
+def save_maps(result: Result, folder: Path, component: Any, clim: Any) -> None:
+    """Draw the connection and the CCF, of three joints for every pair, and the frame
+    that was chosen, if it is one of those."""
     from geomech import plots
     from geomech.results.fields import connection_of, field_of, slices_of
     from geomech.results.scenes import scene_of
@@ -194,7 +197,6 @@ def save_figure(figure: Any, stem: Path) -> None:
 def refuse_folder(scene: Any, folder: Path) -> None:
     """Refuse a folder in which an input would be replaced, or a scene that no `run` has
     written."""
-    from geomech.io.files import refuse_inputs
     from geomech.scenes import inputs
     from geomech.scenes.write import toml
 
@@ -202,7 +204,7 @@ def refuse_folder(scene: Any, folder: Path) -> None:
     refuse_inputs([path, folder / TABLES], inputs(scene))
     if not os.path.lexists(path) or os.path.lexists(folder / TABLES):
         return
-    if not holds(path, toml(scene)):
+    if not has_text(path, toml(scene)):
         raise Refusal(
             f"cannot write {path}",
             because="another scene stands there",
@@ -210,10 +212,8 @@ def refuse_folder(scene: Any, folder: Path) -> None:
         )
 
 
-def holds(path: Path, text: str) -> bool:
+def has_text(path: Path, text: str) -> bool:
     """Return whether a file has this text and no more."""
-    from geomech.io.files import read
-
     try:
         return read(path, 4 * len(text) + 4) == text.encode()
     except (OSError, ValueError):

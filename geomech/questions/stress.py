@@ -2,20 +2,14 @@
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
-from geomech.questions import names
+from geomech.core.variables import Result
+from geomech.questions import loading, names
 from geomech.questions.base import Option, Question, Run, Subject
-
-if TYPE_CHECKING:
-    from geomech.core.variables import Result
+from geomech.results.numbers import number
 
 HELP = "name (see 'geomech scenes'), TOML or CSV of plate drags"
-
-
-def named(medium: str) -> str:
-    """Return the name of a medium as it is: it is read when it is asked."""
-    return medium
 
 
 @dataclass(frozen=True)
@@ -23,7 +17,9 @@ class Stress(Question):
     """Compute the stress of grains on a plate per unit depth. In N/cm^3, backwards
     (alpha_x) and upwards (alpha_z), as in Fig. 7."""
 
-    medium: Annotated[str, Subject(named, names.medium_names, (), "MEDIUM", HELP)]
+    medium: Annotated[
+        str, Subject(loading.as_typed, names.medium_names, (), "MEDIUM", HELP)
+    ]
     beta: Annotated[
         float | None,
         Option("tilt of the plate in degrees, 0 if it lies flat", "ANGLE"),
@@ -51,15 +47,13 @@ class Stress(Question):
 
         stress.check(self.beta, self.gamma, self.drawn)
 
-    def compute(self, run: Run) -> "Result":
+    def compute(self, run: Run) -> Result:
         from geomech.studies import stress
 
         return stress.answer(self.medium, self.beta, self.gamma, self.drawn)
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
-        from geomech.results.numbers import number
-
+    def headline(result: Result) -> list[str]:
         parts = []
         for name in ("alpha_x", "alpha_z"):
             if name in result:
@@ -72,13 +66,12 @@ class Stress(Question):
         return ["; ".join(parts), about]
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         return result.only()
 
     @staticmethod
-    def draw(result: "Result") -> Any:
-        """Draw the stress map, and the plate that was asked for on it; return the
-        Figure."""
+    def draw(result: Result) -> Any:
+        """Draw the stress map with the plate of the question; return the Figure."""
         from geomech import plots
         from geomech.studies import stress
 

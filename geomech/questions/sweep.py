@@ -1,4 +1,5 @@
-"""Displacement of a gait, or speed of a robot, over a grid of parameters of the scene."""
+"""Displacement of a gait, or speed of a robot, over a grid of parameters of the
+scene."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -6,24 +7,24 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from geomech.core.variables import Result
 from geomech.questions import loading, names, parsing
 from geomech.questions.base import Option, Question, Run, Subject
+from geomech.run.cost import Cost
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
-    from geomech.run.cost import Cost
     from geomech.scenes.model import Scene
     from geomech.studies.sweep import Plan
 
 SHOWN = ("net_distance", "speed", "status")
-DRAWN = 2  # parameters of a figure at most
+LARGEST_DRAWN = 2  # parameters of a figure
 
 
 @dataclass(frozen=True)
 class Sweep(Question):
-    """Compute displacement or speed over a grid of parameters. Speeds are those of walking
-    robots. A repeated command resumes an interrupted one."""
+    """Compute displacement or speed over a grid of parameters. Speeds are those of
+    walking robots. A repeated command resumes an interrupted one."""
 
     scene: Annotated["Scene", Subject(loading.load_moving, names.scene_names)]
     over: Annotated[
@@ -35,7 +36,8 @@ class Sweep(Question):
             repeated=True,
         ),
     ]
-    # A file of finished batches, from which the same sweep resumes; a command has its own.
+    # A file of finished batches, from which the same sweep resumes; a command has its
+    # own.
     partial: Path | None = field(default=None, kw_only=True, compare=False)
 
     name: ClassVar[str] = "sweep"
@@ -51,16 +53,16 @@ class Sweep(Question):
         _ = self.plan.grid  # refuses points that make no scene
 
     def check_draw(self) -> None:
-        if len(self.over) > DRAWN:
+        if len(self.over) > LARGEST_DRAWN:
             raise Refusal(
                 f"cannot draw {len(self.over)} parameters",
                 instead="sweep one or two, or leave ``plot`` out",
             )
 
-    def cost(self) -> "Cost":
+    def cost(self) -> Cost:
         return self.plan.cost
 
-    def compute(self, run: Run) -> "Result":
+    def compute(self, run: Run) -> Result:
         from geomech.studies.sweep import stored_in
 
         seconds = None
@@ -70,7 +72,7 @@ class Sweep(Question):
             return self.plan.result(run.progress, seconds)
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
+    def headline(result: Result) -> list[str]:
         axes = [v for v in result.variables if v.is_coordinate]
         points = 1
         for axis in axes:
@@ -79,11 +81,11 @@ class Sweep(Question):
         return [f"{result.attributes['scene']}: {points} points, {over}"]
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         return result.only(*SHOWN)
 
     @staticmethod
-    def draw(result: "Result") -> Any:
+    def draw(result: Result) -> Any:
         """Draw curves over one parameter, or maps over two; return the Figure."""
         from geomech import plots
         from geomech.results.scenes import scene_of

@@ -1,28 +1,26 @@
-"""What several questions make their results with."""
+"""Functions that several questions share."""
 
-from collections.abc import Iterable, Mapping
+import warnings
+from collections.abc import Iterable
 from dataclasses import fields
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from geomech.core.errors import Note, choose
+from geomech.core.variables import COMPONENTS, Result, Variable, same_or_each
 from geomech.questions import base
+from rft.core.checks import is_number
 from rft.core.refusal import in_line
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from geomech.core.variables import Result, Variable
 
 FILMS = (".gif", ".mp4")
 
 
-def numbers(values: Any) -> Any:
+def as_numbers(values: Any) -> Any:
     """Return a number or a list of numbers as a tuple; anything else as it is, for its
     reader to refuse."""
-    import numpy as np
-
-    from rft.core.checks import is_number
-
     if is_number(values):
         return (float(values),)
     if isinstance(values, (str, bytes)) or np.ndim(values) != 1:
@@ -30,7 +28,7 @@ def numbers(values: Any) -> Any:
     return tuple(np.asarray(values).tolist())
 
 
-def words(names: Any) -> Any:
+def as_words(names: Any) -> Any:
     """Return a name or a list of names as a tuple, none for None."""
     if names is None:
         return ()
@@ -40,8 +38,8 @@ def words(names: Any) -> Any:
 
 
 def command_line(question: base.Question) -> str:
-    """Return the command that asks a question, without its output and without options on
-    which its answer does not depend."""
+    """Return the command that asks a question, without its output and without options
+    on which its answer does not depend."""
     compared = [one.name for one in fields(question) if one.compare]
     words = ["geomech", question.name.replace("_", "-")]
     if question.subject is not None:
@@ -65,53 +63,27 @@ def option_text(value: Any) -> str:
     return str(value)
 
 
-def component() -> "Variable":
+def component() -> Variable:
     """Return the coordinate of x, y and theta."""
-    from geomech.core.variables import Variable
-
-    return Variable("component", ("component",), ["x", "y", "theta"])
+    return Variable("component", ("component",), COMPONENTS)
 
 
-def seconds(took: Mapping[str, float], kept: Iterable[str]) -> "list[Variable]":
-    """Return the seconds that parts of a computation took, and whether they were computed
-    before."""
-    import numpy as np
-
-    from geomech.core.variables import Variable
-
-    before = [int(part in kept) for part in took]
-    return [
-        Variable("part", ("part",), np.array([*took], dtype="U")),
-        Variable("seconds", ("part",), [*took.values()], "s", "of computing"),
-        Variable("computed_before", ("part",), before, "1", "1 if it was"),
-    ]
-
-
-def selected(variable: "Variable", dim: str, mask: list[bool]) -> "Variable":
+def selected(variable: Variable, dim: str, mask: list[bool]) -> Variable:
     """Return a variable at some places of a dimension."""
-    import numpy as np
-
     axis = variable.dims.index(dim)
     return variable.with_arrays(partial(np.compress, mask, axis=axis))
 
 
-def warn_of_notes(result: "Result") -> None:
+def warn_of_notes(result: Result) -> None:
     """Warn in Python of what a command prints as notes."""
-    import warnings
-
-    from geomech.core.errors import Note
-
     if "note" in result:
         for line in result["note"].values.tolist():
             warnings.warn(line, Note, stacklevel=4)
 
 
-def side_by_side(
-    result: "Result", name: str, dim: str, names: Iterable[str]
-) -> "Variable":
-    """Return variables without dimensions as one, over a dimension, with their errors."""
-    from geomech.core.variables import Variable, same_or_each
-
+def side_by_side(result: Result, name: str, dim: str, names: Iterable[str]) -> Variable:
+    """Return variables without dimensions as one, over a dimension, with their
+    errors."""
     parts = [result[each] for each in names]
     values = [float(part) for part in parts]
     errors = [float(part.error) for part in parts]
@@ -119,10 +91,8 @@ def side_by_side(
     return Variable(name, (dim,), values, units, error=errors)
 
 
-def in_degrees(variable: "Variable") -> "Variable":
+def in_degrees(variable: Variable) -> Variable:
     """Return an angle in degrees, and any other variable as it is."""
-    import numpy as np
-
     if variable.unit != "rad":
         return variable
     return variable.with_arrays(np.degrees, unit="degrees")
@@ -130,21 +100,18 @@ def in_degrees(variable: "Variable") -> "Variable":
 
 def component_number(components: Any) -> int:
     """Return the number of one component, x, y or theta; x if none is named."""
-    from geomech.core.errors import choose
-
-    known = ("x", "y", "theta")
     if isinstance(components, str):
         components = (components,)
     names = [*components] or ["x"]
-    return known.index(choose("component", names[0], known))
+    return COMPONENTS.index(choose("component", names[0], COMPONENTS))
 
 
-def is_film(path: "Path") -> bool:
+def is_film(path: Path) -> bool:
     """Return whether a file is a film by its ending."""
     return path.suffix.lower() in FILMS
 
 
-def check_films(paths: "Iterable[Path]") -> None:
+def check_films(paths: Iterable[Path]) -> None:
     """Refuse films that nothing here can write."""
     for path in paths:
         if is_film(path):

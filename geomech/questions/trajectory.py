@@ -1,26 +1,25 @@
-"""The motion of a body through its gait: pose, shape and ends of the links at every phase;
-as a film or a strip of pictures, too."""
+"""The motion of a body through its gait: pose, shape and ends of the links at every
+phase; as a film or a strip of pictures, too."""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from geomech.core.variables import POSE, Result
 from geomech.questions import loading, names
 from geomech.questions.base import Option, Question, Run, Subject
 from geomech.questions.tools import FILMS, check_films, is_film
+from geomech.run.cost import Cost
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
-    from geomech.run.cost import Cost
     from geomech.scenes.model import Scene
 
-POSE = ("x", "y", "heading")
 FINAL = ("final_x", "final_y", "final_heading")
-OF_FILM = 3  # cycles, where nobody says how many
-WITHOUT_MAP = (".csv", ".txt")  # files that nobody draws from
+CYCLES_OF_FILM = 3  # by default
+WITHOUT_MAP = (".csv", ".txt")  # files from which nothing is drawn
 
 
-def write_film(path: Path, result: "Result") -> None:
+def write_film(path: Path, result: Result) -> None:
     """Write a film of the motion."""
     from geomech import films
 
@@ -30,8 +29,8 @@ def write_film(path: Path, result: "Result") -> None:
 @dataclass(frozen=True)
 class Trajectory(Question):
     """Follow the body through its gait. A table has pose, joint angles and ends of all
-    links at every phase. A film (-o FILE.gif) or a strip of pictures for a page (--plot)
-    shows the body on its track beside its shape on the CCF."""
+    links at every phase. A film (-o FILE.gif) or a strip of pictures for a page
+    (--plot) shows the body on its track beside its shape on the CCF."""
 
     scene: Annotated["Scene", Subject(loading.load_scene, names.scene_names)]
     cycles: Annotated[
@@ -59,10 +58,11 @@ class Trajectory(Question):
 
     def for_files(self, paths: list[Path], options: dict[str, Any]) -> Question:
         check_films(paths)
-        drawn = [p for p in paths if p.suffix.lower() not in WITHOUT_MAP]
-        filmed, cycles = any(map(is_film, paths)), self.cycles
+        drawn = [path for path in paths if path.suffix.lower() not in WITHOUT_MAP]
+        filmed = any(map(is_film, paths))
+        cycles = self.cycles
         if filmed and cycles is None:
-            cycles = OF_FILM
+            cycles = CYCLES_OF_FILM
         return replace(self, cycles=cycles, mapped=bool(drawn), filmed=filmed)
 
     def for_picture(self, **options: Any) -> Question:
@@ -73,7 +73,7 @@ class Trajectory(Question):
 
         motion.checked(self.count)
 
-    def cost(self) -> "Cost":
+    def cost(self) -> Cost:
         from geomech.studies import motion
 
         cost = motion.cost(self.scene, self.count, self.mapped)
@@ -85,7 +85,7 @@ class Trajectory(Question):
         frequency = motion.frequency_of(self.scene)
         return motion.summed([cost, films.cost(phases, self.count, frequency)])
 
-    def compute(self, run: Run) -> "Result":
+    def compute(self, run: Run) -> Result:
         from geomech.studies import motion
 
         tables = run.tables_of(self.scene)
@@ -96,7 +96,7 @@ class Trajectory(Question):
         return dict.fromkeys(FILMS, write_film)
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
+    def headline(result: Result) -> list[str]:
         facts = result.attributes
         count = facts["cycles"]
         cycles = "1 cycle"
@@ -108,11 +108,11 @@ class Trajectory(Question):
         ]
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         return result.only(*FINAL, "time", *POSE)
 
     @staticmethod
-    def draw(result: "Result", *, pictures: int = 6) -> Any:
+    def draw(result: Result, *, pictures: int = 6) -> Any:
         """Draw the body at some phases and its shapes beside it; return the Figure.
 
         pictures: how many."""

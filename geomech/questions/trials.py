@@ -1,11 +1,10 @@
 """The words for results of midlines."""
 
-from typing import TYPE_CHECKING
+import math
 
+from geomech.core.variables import Result
 from geomech.questions import tools
-
-if TYPE_CHECKING:
-    from geomech.core.variables import Result
+from geomech.results.show import scalar
 
 SHOWN = (
     "frequency", "body_length", "speed", "stride", "heading", "turn", "slip",
@@ -13,11 +12,11 @@ SHOWN = (
 )  # fmt: skip
 
 
-def headline(result: "Result") -> list[str]:
-    facts, noise = result.attributes, float(result["noise"])
-    first = (
-        f"{facts['file']}: {facts['cycles']} full cycles of {facts['points']} points"
-    )
+def headline(result: Result) -> list[str]:
+    facts = result.attributes
+    noise = float(result["noise"])
+    cycles = f"{facts['cycles']} full cycles of {facts['points']} points"
+    first = f"{facts['file']}: {cycles}"
     if facts["cycles_left_out"]:
         first = f"{first}; {facts['cycles_left_out']} with gaps left out"
     return [
@@ -30,9 +29,9 @@ def headline(result: "Result") -> list[str]:
     ]
 
 
-def summary(result: "Result") -> "Result":
-    """Return the quantities and, of a prediction, what is measured and what is predicted
-    side by side."""
+def summary(result: Result) -> Result:
+    """Return the quantities and, of a prediction, what is measured and what is
+    predicted side by side."""
     shown = result.only(*SHOWN)
     if "compared" not in result:
         return shown
@@ -45,34 +44,32 @@ def summary(result: "Result") -> "Result":
     )
 
 
-def remarks(result: "Result") -> list[str]:
+def remarks(result: Result) -> list[str]:
     lines = []
     if "compared" in result:
         names = result["compared"].values
-        agree = result["apart"].values <= 1
-        for words, chosen in (("agree", names[agree]), ("differ", names[~agree])):
+        agrees = result["apart"].values <= 1
+        for verb, chosen in (("agree", names[agrees]), ("differ", names[~agrees])):
             if chosen.size:
-                lines.append(f"measured and predicted {words}: {', '.join(chosen)}")
+                lines.append(f"measured and predicted {verb}: {', '.join(chosen)}")
     if "parameter" in result:
         for name in result["parameter"].values.tolist():
             lines.append(closing_words(result, name))
     return lines
 
 
-def closing_words(result: "Result", name: str) -> str:
+def closing_words(result: Result, name: str) -> str:
     """Return which value of a parameter of the medium gives the measured distance."""
-    import math
-
-    from geomech.results.show import scalar
-
     one = result.at(parameter=name)
-    present, closing = one["parameter_present"], one["parameter_closing"]
+    present = one["parameter_present"]
+    closing = one["parameter_closing"]
     words = f"{name} = {scalar(tools.in_degrees(present))}"
     if math.isfinite(float(closing)):
         value = scalar(tools.in_degrees(closing))
         return f"{words}: {value} gives the measured distance"
     tried = tools.in_degrees(one["parameter_tried"])
     low, high = (float(f"{x:.3g}") for x in tried.values)
-    unit = f" {tried.unit}" if tried.unit != "1" else ""
-    span = f"{low:g} to {high:g}{unit}"
+    span = f"{low:g} to {high:g}"
+    if tried.unit != "1":
+        span = f"{span} {tried.unit}"
     return f"{words}: none from {span} gives the measured distance"

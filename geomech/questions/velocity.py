@@ -3,18 +3,19 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
+from geomech.core.variables import Result
 from geomech.questions import loading, names, parsing, tools
 from geomech.questions.base import Option, Question, Run, Subject
+from rft.core.refusal import located
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
     from geomech.scenes.model import Scene
 
 
 @dataclass(frozen=True)
 class Velocity(Question):
-    """Compute the body velocity of one shape and its rate. The answer has a residual and
-    a status."""
+    """Compute the body velocity of one shape and its rate. The answer has a residual
+    and a status."""
 
     scene: Annotated["Scene", Subject(loading.load_with_gait, names.scene_names)]
     alpha: Annotated[
@@ -32,18 +33,16 @@ class Velocity(Question):
 
     def __post_init__(self) -> None:
         self._set(
-            alpha=tools.numbers(self.alpha), alphadot=tools.numbers(self.alphadot)
+            alpha=tools.as_numbers(self.alpha), alphadot=tools.as_numbers(self.alphadot)
         )
 
-    def compute(self, run: Run) -> "Result":
-        from geomech.core.variables import Result
+    def compute(self, run: Run) -> Result:
         from geomech.studies.single import velocity
-        from rft.core.refusal import located
 
         with located(self.scene.name):
             found = velocity(self.scene.system, self.alpha, self.alphadot)
         return Result("velocity", (tools.component(), *found))
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
+    def headline(result: Result) -> list[str]:
         return [f"{result.attributes['scene']}: body velocity xi per unit of time"]

@@ -1,18 +1,21 @@
-"""How a robot walks on grains: its motion from rest, and the means of its limit cycle with
-their errors."""
+"""How a robot walks on grains: its motion from rest, and the means of its limit cycle
+with their errors."""
 
 import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+import numpy as np
+
+from geomech.core.variables import Result
 from geomech.questions import loading, names
 from geomech.questions.base import Option, Question, Run, Subject
 from geomech.questions.tools import FILMS, check_films
+from geomech.results.show import scalar
+from geomech.run.cost import LONGEST, Cost
 
 if TYPE_CHECKING:
-    from geomech.core.variables import Result
-    from geomech.run.cost import Cost
     from geomech.scenes.walker import WalkerScene
 
 WALKING = "walking"  # status of a robot that neither sank nor fell
@@ -21,7 +24,7 @@ ANGLES = {"pitch": "nose down", "roll": "left side up", "yaw": "turning left"}
 
 def write_film(
     path: Path,
-    result: "Result",
+    result: Result,
     *,
     follow: Annotated[bool, Option("the camera of the film goes with the robot")] = (
         False
@@ -35,8 +38,8 @@ def write_film(
 
 @dataclass(frozen=True)
 class Walk(Question):
-    """Compute how a robot walks on grains. The mean speed has an error; the motion begins
-    at rest. SI units, pitch in rad, nose down."""
+    """Compute how a robot walks on grains. The mean speed has an error; the motion
+    begins at rest. SI units, pitch in rad, nose down."""
 
     scene: Annotated["WalkerScene", Subject(loading.load_walker, names.walker_names)]
     engine: Annotated[
@@ -55,17 +58,17 @@ class Walk(Question):
         check_films(paths)
         return self
 
-    def cost(self) -> "Cost":
+    def cost(self) -> Cost:
         from geomech.studies import walking
 
         return walking.price(self.scene, by=self.engine)
 
-    def compute(self, run: Run) -> "Result":
-        from geomech.core.variables import Result
-        from geomech.run.cost import LONGEST
+    def compute(self, run: Run) -> Result:
         from geomech.studies import walking
 
-        longest = LONGEST if run.limited else math.inf
+        longest = math.inf
+        if run.limited:
+            longest = LONGEST
         found = walking.run(self.scene, self.engine, run.progress, longest)
         return Result("walk", tuple(walking.variables(self.scene, found)))
 
@@ -74,19 +77,18 @@ class Walk(Question):
         return dict.fromkeys(FILMS, write_film)
 
     @staticmethod
-    def headline(result: "Result") -> list[str]:
-        from geomech.results.show import scalar
-
-        name, status = result.attributes["scene"], str(result["status"].values)
+    def headline(result: Result) -> list[str]:
+        name = result.attributes["scene"]
+        status = str(result["status"].values)
         speed = scalar(result["speed"])
-        regular = "no limit cycle found: mean of what there is"
+        cycle = "no limit cycle found: mean of what there is"
         if result["periodic"].values:
-            regular = f"limit cycle{settling_words(result)}"
+            cycle = f"limit cycle{settling_words(result)}"
         frequency = float(result["frequency"])
-        return [f"{name}: {status} at {speed} at {frequency:g} Hz ({regular})"]
+        return [f"{name}: {status} at {speed} at {frequency:g} Hz ({cycle})"]
 
     @staticmethod
-    def summary(result: "Result") -> "Result":
+    def summary(result: Result) -> Result:
         shown = ["total_work", "total_loss", "cost_of_transport"]
         if str(result["status"].values) != WALKING:
             shown.remove("cost_of_transport")
@@ -95,7 +97,7 @@ class Walk(Question):
         return result.only(*shown)
 
     @staticmethod
-    def remarks(result: "Result") -> list[str]:
+    def remarks(result: Result) -> list[str]:
         steps = float(result["speed_error_of_steps"])
         elements = float(result["speed_error_of_elements"])
         share = 100 * float(result["unaccounted"])
@@ -108,17 +110,17 @@ class Walk(Question):
         unsolved = int(result["unsolved"].values)
         if unsolved:
             residual = float(result["residual"])
-            moved = float(result["speed_error_of_unsolved"])
+            speed_error = float(result["speed_error_of_unsolved"])
             lines.append(
-                f"{unsolved} steps were taken unsolved, off by up to {residual:.1g} m/s, "
-                f"which moves the speed by {moved:.1g} m/s: "
+                f"{unsolved} steps were taken unsolved, off by up to {residual:.1g} "
+                f"m/s, which moves the speed by {speed_error:.1g} m/s: "
                 "raise [numerics] steps or rounding"
             )
         return lines
 
     @staticmethod
     def draw(
-        result: "Result",
+        result: Result,
         *,
         strip: Annotated[bool, Option("draw the last cycle in pictures")] = False,
     ) -> Any:
@@ -131,13 +133,14 @@ class Walk(Question):
         return plots.walk_figure(result)
 
 
-def settling_words(result: "Result") -> str:
+def settling_words(result: Result) -> str:
     """Return the time that a robot takes from rest to the limit cycle, in words."""
     from geomech.studies.walking import NEAR
 
     if "settling_time" not in result:
         return ""
-    time, within = float(result["settling_time"]), f"within {100 * NEAR:g} % of it"
+    time = float(result["settling_time"])
+    within = f"within {100 * NEAR:g} % of it"
     if math.isinf(time):
         return f"; from rest it does not come {within}"
     if time == 0:
@@ -145,10 +148,8 @@ def settling_words(result: "Result") -> str:
     return f"; from rest {within} after {time:.2g} s"
 
 
-def motion_words(result: "Result") -> str:
+def motion_words(result: Result) -> str:
     """Return where the robot went and how far it turned."""
-    import numpy as np
-
     t, x, z = (result[name].values for name in ("t", "x", "z"))
     words = f"t = 0 to {t[-1]:.4g} s: x to {x[-1]:.4g} m"
     if "y" in result:

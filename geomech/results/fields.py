@@ -49,7 +49,8 @@ def field_of(result: Result, name: str) -> tuple[Field, Field | None]:
     """Return a variable over components and shape space as a field, and its error."""
     variable = result[name]
     axes = axes_of(result, variable.dims[1:])
-    degree, unit = degree_of(result), length_unit(variable)
+    degree = degree_of(result)
+    unit = length_unit(variable)
     error = None
     if variable.error is not None:
         error = Field(axes, variable.error, degree, unit=unit)
@@ -62,7 +63,8 @@ def connection_of(result: Result, name: str = "A") -> Connection:
     variable = result[name]
     axes = axes_of(result, variable.dims[2:])
     unknown = np.full_like(variable.values[:, 0], np.nan)
-    degree, unit = degree_of(result), length_unit(variable)
+    degree = degree_of(result)
+    unit = length_unit(variable)
     return Connection(axes, variable.values, unknown, unknown, degree, unit=unit)
 
 
@@ -73,7 +75,8 @@ def metric_of(result: Result) -> Metric | Finsler:
         metric = result["metric"]
         return Metric(axes_of(result, metric.dims[2:]), metric.values, degree)
     norm = result["norm"]
-    axes, residual = axes_of(result, norm.dims[1:]), result["norm_residual"].values
+    axes = axes_of(result, norm.dims[1:])
+    residual = result["norm_residual"].values
     return Finsler(axes, norm.values, residual, degree)
 
 
@@ -95,13 +98,11 @@ def pairs_of(result: Result, name: str) -> list[tuple[str, tuple[int, int]]]:
     """Return the endings of names such as ccf_1_3, and their joints from 0."""
     found = []
     for other in result:
+        if not other.startswith(name):
+            continue
         ending = other.removeprefix(name)
         numbers = ending.split("_")[1:]
-        if (
-            other.startswith(name)
-            and len(numbers) == 2
-            and all(map(str.isdigit, numbers))
-        ):
+        if len(numbers) == 2 and all(map(str.isdigit, numbers)):
             i, j = map(int, numbers)
             found.append((ending, (i - 1, j - 1)))
     return found

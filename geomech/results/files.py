@@ -22,8 +22,8 @@ flat = io.flat
 
 
 def table_dims(result: Result) -> tuple[str, ...]:
-    """Return the dimensions of a result's CSV file and data frame: those of its kind, or
-    of its first variable that is no coordinate."""
+    """Return the dimensions of a result's CSV file and data frame: those of its kind,
+    or of its first variable that is no coordinate."""
     dims = kind_of(result).table
     if dims:
         return dims
@@ -34,8 +34,8 @@ def table_dims(result: Result) -> tuple[str, ...]:
 
 
 def to_dataframe(result: Result, dims: tuple[str, ...] = ()) -> Any:
-    """Return a data frame with the coordinates as its index; ImportError that says how to
-    install pandas."""
+    """Return a data frame with the coordinates as its index; ImportError that says how
+    to install pandas."""
     try:
         import pandas
     except ImportError:
@@ -87,22 +87,22 @@ READERS: dict[str, Callable] = {
 
 
 def formats(kind: Any) -> dict[str, Callable]:
-    """Return the writers of a kind by ending: those of every kind, and those of its own in
-    their place."""
+    """Return the writers of a kind by ending: those of every kind, and those of its own
+    in their place."""
     return {**WRITERS, **kind.files()}
 
 
 def writer(path: Path, kind: Any) -> Callable:
     """Return the writer (path, result) of a name; Refusal if its ending is no format of
     the kind."""
-    known = formats(kind)
+    writers = formats(kind)
     ending = path.suffix.lower()
-    if ending not in known:
+    if ending not in writers:
         raise Refusal(
             f"cannot write {path}",
-            instead=f"end the name in one of {', '.join(known)}",
+            instead=f"end the name in one of {', '.join(writers)}",
         )
-    return known[ending]
+    return writers[ending]
 
 
 def save(result: Result, path: Path, **options: Any) -> None:
@@ -111,8 +111,8 @@ def save(result: Result, path: Path, **options: Any) -> None:
 
 
 def load(path: str | Path) -> Result:
-    """Return the result in a file: of .nc, .json and .mat as it was written, of .csv the
-    columns. Refusal for another ending, or a file without a result."""
+    """Return the result in a file: of .nc, .json and .mat as it was written, of .csv
+    the columns. Refusal for another ending, or a file without a result."""
     path = Path(path)
     if path.suffix.lower() not in READERS:
         raise Refusal(

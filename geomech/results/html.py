@@ -17,13 +17,13 @@ DPI = 90
 
 def html(result: Result) -> str:
     """Return a result as HTML."""
-    shown = []
+    elements = []
     for part in parts(result):
         if isinstance(part, Table):
-            shown.append(table(part))
+            elements.append(table(part))
         else:
-            shown.append(f"<p>{escaped(part)}</p>")
-    return f"<div>{''.join(shown)}{picture(result)}</div>"
+            elements.append(f"<p>{escaped(part)}</p>")
+    return f"<div>{''.join(elements)}{picture(result)}</div>"
 
 
 def escaped(text: str) -> str:
@@ -32,7 +32,9 @@ def escaped(text: str) -> str:
 
 def table(part: Table) -> str:
     """Return a table with a row for each coordinate."""
-    columns = [part.first, *(column for block in part.blocks for column in block)]
+    columns = [part.first]
+    for block in part.blocks:
+        columns += block
     heads, *rows = zip(*columns)
     body = row("th", heads) + "".join(row("td", cells) for cells in rows)
     title = ""
@@ -47,8 +49,8 @@ def row(tag: str, cells: tuple[str, ...]) -> str:
 
 
 def picture(result: Result) -> str:
-    """Return the picture of a result; nothing for a kind without one, or one that takes
-    a scene that is not there."""
+    """Return the picture of a result; "" for a kind without one, or where the picture
+    takes a scene that the result lacks."""
     kind = kind_of(result)
     if kind.draw is None:
         return ""

@@ -30,8 +30,8 @@ def series_of(result: Result) -> TaylorSeries:
 
 
 def fitted_gait(result: Result) -> Fourier:
-    """Return the mean gait of a log, from a result of `fit_gait`: of amplitude 1, with the
-    log's frequency if its t is a time.
+    """Return the mean gait of a log, from a result of `fit_gait`: of amplitude 1, with
+    the log's frequency if its t is a time.
 
     Examples
     --------
@@ -46,12 +46,16 @@ def fitted_gait(result: Result) -> Fourier:
     2
     """
     _refuse_other(result)
-    c, frequency = result["gait"].values, None
+    # Columns: the mean, then cos and sin of each harmonic in turn.
+    series = result["gait"].values
+    frequency = None
     if result["frequency"].unit == "Hz":
         frequency = float(result["frequency"])
-    cos, sin = (tuple(map(tuple, c[:, k::2].tolist())) for k in (1, 2))
     return Fourier(
-        cos=cos, sin=sin, centre=tuple(c[:, 0].tolist()), frequency=frequency
+        cos=tuple(map(tuple, series[:, 1::2].tolist())),
+        sin=tuple(map(tuple, series[:, 2::2].tolist())),
+        centre=tuple(series[:, 0].tolist()),
+        frequency=frequency,
     )
 
 
@@ -64,8 +68,12 @@ def scene_text(result: Result, field: Path, scene: Path) -> str:
         "system": {"kind": "table", "file": file},
         "gait": gait_table(fitted_gait(result)),
     }
-    head = f"# The mean gait of {facts['cycles']} cycles of {facts['file']}, and the connection near it.\n"
-    return "\n".join([head, *(table(name, keys) for name, keys in parts.items())])
+    comment = (
+        f"# The mean gait of {facts['cycles']} cycles of {facts['file']}, and the "
+        "connection near it.\n"
+    )
+    tables = [table(name, keys) for name, keys in parts.items()]
+    return "\n".join([comment, *tables])
 
 
 def _refuse_other(result: Result) -> None:

@@ -17,11 +17,11 @@ def decimals(values: np.ndarray, errors: np.ndarray | None) -> int | None:
     None for the shortest form of each number."""
     if errors is None:
         return None
-    known = errors[np.isfinite(errors) & (errors > 0)]
+    positive = errors[np.isfinite(errors) & (errors > 0)]
     sizes = np.abs(values[np.isfinite(values)])
-    if not known.size or not sizes.size:
+    if not positive.size or not sizes.size:
         return None
-    by_error = 1 - magnitude(float(known.min()))
+    by_error = 1 - magnitude(float(positive.min()))
     by_size = SIGNIFICANT - 1 - magnitude(float(sizes.max()))
     places = min(by_error, by_size)
     if places > MOST_DECIMALS:
@@ -35,7 +35,8 @@ def magnitude(number: float) -> int:
 
 
 def number(value: float, places: int | None = None, digits: int = PLAIN) -> str:
-    """Return a number with so many decimal places, or in its shortest form."""
+    """Return a number with ``places`` decimal places, or with ``digits`` digits in its
+    shortest form; "-" for nan."""
     if not math.isfinite(value):
         return "-"
     if places is None or value == 0:

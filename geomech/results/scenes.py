@@ -9,8 +9,8 @@ from rft.core.refusal import Refusal
 
 
 def scene_of(result: Result) -> Any:
-    """Return the scene of a result: that of its question, or the one that its file spells
-    out; Refusal for a file without one."""
+    """Return the scene of a result: that of its question, or the one that its file
+    spells out; Refusal for a file without one."""
     if result.question is not None:
         return result.question.subject
     return _parsed(result, "scene_toml")

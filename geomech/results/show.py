@@ -67,9 +67,10 @@ def parts(result: Result, everything: bool = False) -> list[str | Table]:
     shown = kind.summary(result)
     rows: int | None = ROWS
     if everything:
-        shown, rows = result, None
+        shown = result
+        rows = None
     found: list[str | Table] = [in_line(line) for line in kind.headline(result)]
-    for variables in by_dims(shown):
+    for variables in variables_by_dims(shown):
         if variables[0].dims:
             found += tables(shown, variables, rows)
         else:
@@ -97,22 +98,22 @@ def leaves_out(result: Result) -> bool:
     return long or len(shown) < len(result)
 
 
-def by_dims(result: Result) -> list[list[Variable]]:
+def variables_by_dims(result: Result) -> list[list[Variable]]:
     """Return the variables to be shown, those with the same dimensions together, in
     the order of the result."""
     groups: dict[tuple[str, ...], list[Variable]] = {}
     for variable in result.variables:
         if not variable.is_coordinate and not zero_reason(variable):
             groups.setdefault(variable.dims, []).append(variable)
-    lonely = [v for v in result.variables if v.is_coordinate and not is_used(result, v)]
-    for coordinate in lonely:
-        groups.setdefault(coordinate.dims, []).append(coordinate)
+    for variable in result.variables:
+        if variable.is_coordinate and not is_used(result, variable):
+            groups.setdefault(variable.dims, []).append(variable)
     return list(groups.values())
 
 
 def is_used(result: Result, coordinate: Variable) -> bool:
     """Return whether another variable is over the dimension of a coordinate."""
-    others = (v for v in result.variables if v is not coordinate)
+    others = [v for v in result.variables if v is not coordinate]
     return any(coordinate.name in v.dims for v in others)
 
 
@@ -121,7 +122,9 @@ def title(name: str) -> str:
 
 
 def unit_of(variable: Variable) -> str:
-    return "" if variable.unit == "1" else variable.units
+    if variable.unit == "1":
+        return ""
+    return variable.units
 
 
 def head(variable: Variable) -> str:
@@ -249,9 +252,9 @@ def aligned(cells: Column) -> Column:
 
 
 def chosen_rows(count: int, most: int | None) -> np.ndarray:
-    """Return the numbers of at most so many rows, evenly spread."""
-    kept = min(count, most or count)
-    return np.unique(np.linspace(0, count - 1, kept).round().astype(int))
+    """Return the numbers of at most ``most`` rows, evenly spread; of all for None."""
+    n_rows = min(count, most or count)
+    return np.unique(np.linspace(0, count - 1, n_rows).round().astype(int))
 
 
 def block(variable: Variable, rows: np.ndarray, name: str, place: Places = ()) -> Block:
@@ -385,7 +388,8 @@ def ranges(
     dimension, a row for each of the second."""
     count, rows = variable.values.shape[:2]
     first = [title(labels[1])]
-    first += [coordinate(result, labels[1], k) for k in range(rows)]
+    for k in range(rows):
+        first.append(coordinate(result, labels[1], k))
     blocks = []
     for place in range(count):
         name = row_name(result, variable, labels[:1], (place,))
@@ -410,7 +414,8 @@ def extremes(
     heading: str,
 ) -> Table:
     """Return the least and the largest value of each label, with their places."""
-    names, rows = [], []
+    names = []
+    rows = []
     for place in np.ndindex(*variable.values.shape[: len(labels)]):
         names.append(row_name(result, variable, labels, place))
         rows.append(extremes_at(result, variable, grid, place))

@@ -1,5 +1,5 @@
-"""The back end of a request: compiled code where the number of balances is worth its start
-and all workers have it."""
+"""The back end of a request: compiled code where the number of balances is worth its
+start and all workers have it."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def prefer_backend(balances: float) -> contextlib.AbstractContextManager[None]:
 
 
 def prefer_for(balances: float) -> None:
-    """Let "auto" be the fastest back end from here on if this number of balances is worth
-    its start."""
+    """Let "auto" be the fastest back end from here on if this number of balances is
+    worth its start."""
     if balances >= WORTH_LOADING:
         prefer(fastest())

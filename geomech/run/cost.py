@@ -1,10 +1,10 @@
 """Cost of requests, and the limits beyond which they need consent.
 
-Balances and memory are counted beforehand. Seconds are assumed at first, from the time of
-balances on the machine that this was written on. Where the assumption does not decide, the
-first balances of the request itself are timed. They are part of the request: nothing is
-computed only to be timed. No computed number depends on seconds. Seconds are CPU time, so
-that other work on the machine does not count."""
+Balances and memory are counted beforehand. Seconds are assumed at first, from the time
+of balances on the machine that this was written on. Where the assumption does not
+decide, the first balances of the request itself are timed. They are part of the
+request: nothing is computed only to be timed. No computed number depends on seconds.
+Seconds are CPU time, so that other work on the machine does not count."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ TIMED_BATCHES = 3
 # Times the median: a batch that takes longer has loaded or compiled code.
 LOADING = 20.0
 
-# Assumed seconds, for each place of the body where forces are evaluated. Measured with the
-# work around a balance: 2e-6 to 5e-6 by NumPy and 0.3e-6 to 1.2e-6 compiled in dry media,
-# 0.8e-6 and 0.5e-6 in a linear one, whose bodies were small.
+# Assumed seconds, for each place of the body where forces are evaluated. Measured with
+# the work around a balance: 2e-6 to 5e-6 by NumPy and 0.3e-6 to 1.2e-6 compiled in dry
+# media, 0.8e-6 and 0.5e-6 in a linear one, whose bodies were small.
 BALANCE = {"numpy": 5e-6, "numba": 0.8e-6}
 LINEAR = 0.1  # times BALANCE, in a linear medium
 BATCH = {"numpy": 2e-3, "numba": 5e-4}  # s for each batch of balances, however small
@@ -40,15 +40,16 @@ STEP = 200
 
 
 class TooLong(Refusal):
-    """A request needs more computing or memory than a command begins without consent."""
+    """A request needs more computing or memory than a command begins without
+    consent."""
 
 
 class Cost(NamedTuple):
     """Cost of a request.
 
-    balances: number of balances of force. seconds: of computing, ``besides`` of which are
-    other work. memory: bytes at the peak. steps: of time, in which balances are solved one
-    after the other."""
+    balances: number of balances of force. seconds: of computing, ``besides`` of which
+    are other work. memory: bytes at the peak. steps: of time, in which balances are
+    solved one after the other."""
 
     balances: int
     seconds: float
@@ -64,7 +65,8 @@ class Cost(NamedTuple):
 
     @property
     def as_balances(self) -> float:
-        """Number of balances that take NumPy about as long, for the choice of a back end."""
+        """Number of balances that take NumPy about as long, for the choice of a back
+        end."""
         return self.balances + STEP * self.steps
 
     @property
@@ -78,7 +80,8 @@ class Cost(NamedTuple):
         return self._replace(seconds=self.besides + factor * of_balances)
 
     def check(self, place: str, yes: bool, less: str = "ask for less") -> None:
-        """Raise `TooLong` beyond the limits unless ``yes``. less: advice on a smaller request."""
+        """Raise `TooLong` beyond the limits unless ``yes``. less: advice on a smaller
+        request."""
         if not yes and (self.seconds > LONGEST or self.memory > LARGEST):
             limits = f"{duration(LONGEST)} or {_size(LARGEST)}"
             raise TooLong(
@@ -125,7 +128,8 @@ def is_undecided() -> bool:
 
 
 class _Stopwatch:
-    """A listener that times the first balances of a request, except those that load code."""
+    """A listener that times the first balances of a request, except those that load
+    code."""
 
     def __init__(self, cost: Cost, judge: Callable[[Cost], None]):
         self.cost = cost
@@ -165,8 +169,8 @@ class _Stopwatch:
 
 
 def duration(seconds: float) -> str:
-    """Return a time in words: at least a second, in the largest unit of which it has one
-    and a half."""
+    """Return a time in words: at least a second, in the largest unit of which it has
+    one and a half."""
     for unit, size in (("days", 86400.0), ("h", 3600.0), ("min", 60.0)):
         count = seconds / size
         if count >= 100:

@@ -21,8 +21,8 @@ class Undigestible(TypeError):
 
 
 def digest(*values: Any) -> bytes:
-    """Return the SHA-256 of values to the last digit: of arrays, numbers, text, containers,
-    functions, and of objects by their fields.
+    """Return the SHA-256 of values to the last digit: of arrays, numbers, text,
+    containers, functions, and of objects by their fields.
 
     Dataclass fields that are not compared are left out, as are cached properties.
     `Undigestible` for other objects."""
@@ -114,8 +114,8 @@ def _cached_properties(kind: type) -> set[str]:
 
 
 def _code(f: types.FunctionType) -> tuple:
-    """Return the name of a function of a module; for a function defined inside another also
-    its code and its closure."""
+    """Return the name of a function of a module; for a function defined inside another
+    also its code and its closure."""
     if "<" not in f.__qualname__:
         return "function", _name(f)
     cells = [cell.cell_contents for cell in f.__closure__ or ()]

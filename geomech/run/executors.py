@@ -1,4 +1,5 @@
-"""Executors: processes of this machine, one per core, or the workers of a Dask cluster."""
+"""Executors: processes of this machine, one per core, or the workers of a Dask
+cluster."""
 
 from __future__ import annotations
 
@@ -59,8 +60,8 @@ class Executor(Protocol):
 
 
 class Processes:
-    """A pool of ``count`` processes, started by the first task. When one of them is ended
-    from outside, all are started anew."""
+    """A pool of ``count`` processes, started by the first task. When one of them is
+    ended from outside, all are started anew."""
 
     remote = False
     patience = None
@@ -112,8 +113,8 @@ class Processes:
 
 
 def _wait_until_dropped(manager: threading.Thread) -> None:
-    """Wait until the thread that manages a pool has dropped tasks that are cancelled, which
-    would make it print a traceback."""
+    """Wait until the thread that manages a pool has dropped tasks that are cancelled,
+    which would make it print a traceback."""
     end = time.monotonic() + PATIENCE
     while _has_cancelled(manager) and time.monotonic() < end:
         time.sleep(1e-3)
@@ -209,7 +210,8 @@ class Cluster:
             with warnings.catch_warnings():
                 # They are of different versions: those that matter are refused.
                 warnings.simplefilter("ignore")
-                # The client of another kind of server prints an error when it is deleted.
+                # The client of another kind of server prints an error when it is
+                # deleted.
                 distributed.comm.resolve_address(self.address)
                 client = distributed.Client(
                     self.address, timeout=WAIT, set_as_default=False

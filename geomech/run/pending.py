@@ -146,7 +146,8 @@ class TaskQueue:
         return self.payload is not None
 
     def _go_on_alone(self, error: NotPicklable) -> None:
-        """Compute all tasks here, with a note; Refusal where a cluster was asked for."""
+        """Compute all tasks here, with a note; Refusal where a cluster was asked
+        for."""
         cure = "put it in a module"
         if self.executor.remote:
             raise Refusal(

@@ -1,5 +1,5 @@
-"""Progress of a long computation: a bar on a terminal and in a notebook, a line every ten
-seconds in a pipe."""
+"""Progress of a long computation: a bar on a terminal and in a notebook, a line every
+ten seconds in a pipe."""
 
 from __future__ import annotations
 
@@ -61,8 +61,8 @@ _current: ContextVar[Computation | None] = ContextVar("computation", default=Non
 
 
 def counted(items: Iterable, count: int, progress: Callable | None) -> Iterator:
-    """Yield items, ``count`` in all, and call ``progress`` with the fraction done before
-    each."""
+    """Yield items, ``count`` in all, and call ``progress`` with the fraction done
+    before each."""
     for n_done, item in enumerate(items, 1):
         if progress:
             progress(n_done / count)
@@ -71,9 +71,9 @@ def counted(items: Iterable, count: int, progress: Callable | None) -> Iterator:
 
 @contextlib.contextmanager
 def progress(title: str, bar: bool = True):
-    """Yield a function that takes the fraction done and shows it: as a bar in a notebook and,
-    unless ``bar`` is False, on a terminal; else as lines on standard error. Inside another
-    computation it is a part of that, under its own title."""
+    """Yield a function that takes the fraction done and shows it: as a bar in a
+    notebook and, unless ``bar`` is False, on a terminal; else as lines on standard
+    error. Inside another computation it is a part of that, under its own title."""
     outer = _current.get()
     if outer is not None:
         before = outer.title, outer.fraction, outer.start

@@ -1,10 +1,10 @@
 """Long computations: tasks that any executor computes and that are stored by content.
 
 A task is a function of a module with an annotated return type, task(common, item) where
-many tasks share something. Its result consists of numbers, text, arrays and containers of
-these. Each result is stored under the digest of everything that it follows from. A request
-that was stopped submits the same tasks again, in whatever order, and computes those whose
-results are not stored.
+many tasks share something. Its result consists of numbers, text, arrays and containers
+of these. Each result is stored under the digest of everything that it follows from. A
+request that was stopped submits the same tasks again, in whatever order, and computes
+those whose results are not stored.
 
 `runner()` is the runner of the request under way; `store_results` gives it a file, and
 `geomech.run.workers.using` an executor.
@@ -55,9 +55,9 @@ class Runner:
     ) -> Iterator:
         """Yield task(common, item) of every item, ``total`` in all, in their order.
 
-        Tasks are computed in this process as long as the remaining ones are not worth the
-        start of other processes. Each takes one thread and the back end of the request,
-        so that the digits do not depend on the executor.
+        Tasks are computed in this process as long as the remaining ones are not worth
+        the start of other processes. Each takes one thread and the back end of the
+        request, so that the digits do not depend on the executor.
 
         seconds: of computing that all tasks take, if known; else the first tasks are
         measured. progress: called with the fraction done."""
@@ -99,9 +99,9 @@ class Runner:
         """Return the state after ``count`` times step(state) -> (state, row), and the
         rows.
 
-        Every `CHECKPOINT` seconds the state is stored, and a stopped request resumes from
-        there. of: all data that steps depend on besides the state, which consists of
-        arrays and numbers. row: the type of a row."""
+        Every `CHECKPOINT` seconds the state is stored, and a stopped request resumes
+        from there. of: all data that steps depend on besides the state, which consists
+        of arrays and numbers. row: the type of a row."""
         kind = tuple[Any, list[row]]
         rows: list = []
         while len(rows) < count:
@@ -127,8 +127,8 @@ class Runner:
             return compute(task, common, item, back_end, one_of_many)
 
     def key(self, *data: Any) -> bytes | None:
-        """Return the key of a result that follows from these data; None where nothing is
-        stored."""
+        """Return the key of a result that follows from these data; None where nothing
+        is stored."""
         if self.store.lost:
             return None
         try:
@@ -219,15 +219,15 @@ def store_results(
     output: Path | None = None,
     keep: bool = False,
 ) -> Iterator[Runner]:
-    """Store results of tasks in ``path`` in the body of the statement; None: nowhere. At
-    its end the file is removed, unless ``keep``.
+    """Store results of tasks in ``path`` in the body of the statement; None: nowhere.
+    At its end the file is removed, unless ``keep``.
 
     context: all data that results depend on besides the tasks, such as files and
-    plug-ins. output: of which one computation at a time is allowed: Refusal while another
-    runs. A resumed request uses no back end that it did not have at first.
+    plug-ins. output: of which one computation at a time is allowed: Refusal while
+    another runs. A resumed request uses no back end that it did not have at first.
 
-    An interrupt or a signal notes what is stored. So does an error after the first write;
-    an earlier error removes the file, and `TooLong` always does."""
+    An interrupt or a signal notes what is stored. So does an error after the first
+    write; an earlier error removes the file, and `TooLong` always does."""
     try:
         store = Store(path, output is not None, BACKENDS.index(fastest()))
     except Busy:
@@ -256,7 +256,7 @@ def _close_after(error: BaseException, store: Store) -> None:
         store.commit()
     if store.written:
         error.add_note(
-            f"{store.written} results so far are kept in {store.path}: the same command "
-            "goes on from there"
+            f"{store.written} results so far are kept in {store.path}: the same "
+            "command goes on from there"
         )
     store.close(done=not store.written)

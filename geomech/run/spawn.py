@@ -1,5 +1,5 @@
-"""Processes that do not load the program that starts them, so that it needs no guard, and
-that end with it."""
+"""Processes that do not load the program that starts them, so that it needs no guard,
+and that end with it."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ TERMINAL_SIGNALS = [
 
 
 def pool(count: int) -> ProcessPoolExecutor:
-    """Return a pool of ``count`` processes, each with one thread of BLAS, which start with
-    the tasks that they get."""
+    """Return a pool of ``count`` processes, each with one thread of BLAS, which start
+    with the tasks that they get."""
     # After a kill the tracker would warn of the resources that it removes.
     with _environment({"PYTHONWARNINGS": "ignore"}):
         resource_tracker.ensure_running()
@@ -30,8 +30,8 @@ def pool(count: int) -> ProcessPoolExecutor:
 
 
 def start_worker() -> None:
-    """Start a worker: printed text goes to the error stream, and the process ends with its
-    parent, even within a task."""
+    """Start a worker: printed text goes to the error stream, and the process ends with
+    its parent, even within a task."""
     sys.geomech_worker = True
     os.dup2(2, 1)
     threading.Thread(target=_end_with_parent, daemon=True).start()
@@ -55,8 +55,8 @@ class Context(context.SpawnContext):
 
 @contextlib.contextmanager
 def _hide_program() -> Iterator[None]:
-    """Hide the program that runs, which a new process would run again, and let libraries
-    there take one thread."""
+    """Hide the program that runs, which a new process would run again, and let
+    libraries there take one thread."""
     program = sys.modules["__main__"]
     sys.modules["__main__"] = types.ModuleType("__main__")
     try:

@@ -47,8 +47,8 @@ class Damaged(sqlite3.DatabaseError):
 
 
 def encode(value: Any) -> bytes:
-    """Return a result as bytes; TypeError unless it consists of numbers, text, arrays and
-    containers of these."""
+    """Return a result as bytes; TypeError unless it consists of numbers, text, arrays
+    and containers of these."""
     return msgspec.msgpack.encode(value, enc_hook=_encode_array)
 
 
@@ -65,8 +65,8 @@ def _encode_array(x: Any) -> Any:
 
 
 def decode(raw: bytes, kind: Any) -> Any:
-    """Return the result of the type ``kind`` from bytes; ValueError or TypeError if they
-    encode none."""
+    """Return the result of the type ``kind`` from bytes; ValueError or TypeError if
+    they encode none."""
     return msgspec.msgpack.decode(
         raw, type=kind, dec_hook=_check_type, ext_hook=_decode_array
     )
@@ -88,13 +88,13 @@ def _decode_array(code: int, raw: memoryview) -> np.ndarray:
 
 
 class Store:
-    """Results under keys of 32 bytes, written to ``path`` every `CHECKPOINT` seconds; without
-    a path nothing is stored.
+    """Results under keys of 32 bytes, written to ``path`` every `CHECKPOINT` seconds;
+    without a path nothing is stored.
 
-    The file is locked from the first write on, and nothing is stored where another command
-    has it. With ``hold`` it is locked at once, or `Busy` is raised. A damaged or foreign
-    file is renamed, with a note. A full disk, or a file system without locks, is said in a
-    line, and from then on nothing is stored.
+    The file is locked from the first write on, and nothing is stored where another
+    command has it. With ``hold`` it is locked at once, or `Busy` is raised. A damaged
+    or foreign file is renamed, with a note. A full disk, or a file system without
+    locks, is said in a line, and from then on nothing is stored.
 
     mark: a number that a new file gets; an old one keeps its own. written: number of
     results in the file. lost: whether nothing is stored."""
@@ -159,8 +159,8 @@ class Store:
         self.due = time.monotonic() + CHECKPOINT
 
     def close(self, done: bool) -> None:
-        """Write what is new, or, once a request is ``done``, remove the file. A file without
-        results is also removed."""
+        """Write what is new, or, once a request is ``done``, remove the file. A file
+        without results is also removed."""
         if not done:
             self.commit()
         if self.db is None:
@@ -240,8 +240,8 @@ class Store:
                 self.path.with_name(self.path.name + ending).unlink()
 
     def _try(self, act: Callable[..., T], *arguments) -> T | None:
-        """Return act(...); None after an error of the file, which is then replaced or given
-        up."""
+        """Return act(...); None after an error of the file, which is then replaced or
+        given up."""
         try:
             return act(*arguments)
         # UnicodeError: of names in a damaged file.
@@ -290,7 +290,8 @@ class Store:
         self._open()
 
     def _give_up(self, error: Exception) -> None:
-        """Note that nothing more is stored; earlier results stay, and so does the lock."""
+        """Note that nothing more is stored; earlier results stay, and so does the
+        lock."""
         note(f"what is done is not kept in {self.path}: {error}")
         self._stop_storing()
         if self.db is not None:
@@ -303,8 +304,8 @@ class Store:
 
 
 def partial_file(output: Path) -> Path:
-    """Return the file that stores unfinished results of an output: ``.NAME.partial`` beside
-    a file, or in a folder."""
+    """Return the file that stores unfinished results of an output: ``.NAME.partial``
+    beside a file, or in a folder."""
     if output.is_dir():
         place = output / (output.resolve().name or "geomech")
     elif ".." in output.parts or output.is_symlink():
@@ -332,8 +333,8 @@ def cache_folder() -> Path | None:
 
 
 def cache_file(question: bytes) -> Path | None:
-    """Return the file in the user's cache folder that stores unfinished results of a command
-    without output; None without a folder.
+    """Return the file in the user's cache folder that stores unfinished results of a
+    command without output; None without a folder.
 
     question: digest of the question."""
     folder = cache_folder()

@@ -1,4 +1,5 @@
-"""One task as it is sent to a process that has not loaded anything yet, and its outcome."""
+"""One task as it is sent to a process that has not loaded anything yet, and its
+outcome."""
 
 from __future__ import annotations
 
@@ -45,7 +46,8 @@ class Outcome(NamedTuple):
 class NotPicklable(Exception):
     """A task that other processes cannot load, and the reason.
 
-    is_told: whether the user hears of it; False for a function defined inside another."""
+    is_told: whether the user hears of it; False for a function defined inside
+    another."""
 
     def __init__(self, reason: str, is_told: bool = False):
         super().__init__(reason)
@@ -63,7 +65,8 @@ def result_type(task: Callable) -> Any:
 
 
 def pack(task: Callable, common: Any, back_end: str) -> TaskPayload:
-    """Return the payload of a task; `NotPicklable` if no other process could load it."""
+    """Return the payload of a task; `NotPicklable` if no other process could load
+    it."""
     from geomech.scenes import kinds
 
     classes = kinds.registered()
@@ -85,8 +88,8 @@ def pack(task: Callable, common: Any, back_end: str) -> TaskPayload:
 def compute(
     task: Callable, common: Any, item: Any, back_end: str, one_of_many: bool = True
 ) -> Any:
-    """Return task(common, item), computed as in a worker. The only task of a request may
-    use all threads."""
+    """Return task(common, item), computed as in a worker. The only task of a request
+    may use all threads."""
     with contextlib.ExitStack() as stack:
         if one_of_many:
             stack.enter_context(one_thread())
@@ -121,7 +124,9 @@ def register_plugins(payload: TaskPayload) -> None:
 def perform(payload: TaskPayload, item: bytes) -> bytes:
     """Return the `Outcome` of a task, pickled; errors are raised where the command
     runs."""
-    value, error, where = None, None, ""
+    value = None
+    error = None
+    where = ""
     with _record_warnings() as caught:
         try:
             task, common = load_task(payload)
@@ -147,8 +152,8 @@ def _picklable(error: Exception) -> Exception:
 
 @contextlib.contextmanager
 def _record_warnings() -> Iterator[list]:
-    """Yield the list of warnings that the body of the statement gives; it stays empty in
-    a process with other work (a thread of Dask's), whose filters must not change."""
+    """Yield the list of warnings that the body of the statement gives; it stays empty
+    in a process with other work (a thread of Dask's), whose filters must not change."""
     if not getattr(sys, "geomech_worker", False):
         yield []
         return

@@ -1,5 +1,5 @@
-"""Executors of large requests: this process, as many others as there are cores, or a Dask
-cluster.
+"""Executors of large requests: this process, as many others as there are cores, or a
+Dask cluster.
 
 Large requests are computed in tasks whose results do not depend on the executor, to the
 last digit. `using` is written around a computation and is no argument of it:
@@ -28,11 +28,11 @@ MOST_PROCESSES = 1024
 @contextlib.contextmanager
 def using(count: int | None = None, scheduler: str | None = None) -> Iterator[None]:
     """Compute large requests in the body of the statement by ``count`` processes, by
-    default one per core, or on the Dask cluster of the ``scheduler`` at an address such as
-    "tcp://10.0.0.1:8786".
+    default one per core, or on the Dask cluster of the ``scheduler`` at an address such
+    as "tcp://10.0.0.1:8786".
 
-    Processes start when a request turns out to be worth it. Refusal for wrong arguments,
-    and at once for a scheduler that does not answer.
+    Processes start when a request turns out to be worth it. Refusal for wrong
+    arguments, and at once for a scheduler that does not answer.
 
     Examples
     --------

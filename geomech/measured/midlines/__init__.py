@@ -1,1 +1,2 @@
-"""Measured midlines: from points tracked along a body to its kinematics, with intervals, one stage a file."""
+"""Measured midlines: from points tracked along a body to its kinematics, with
+intervals, one stage a file."""

@@ -164,7 +164,7 @@ def fit_midlines(
 
         return kinematics.pseudo_values(weighted, len(used))
 
-    sample = intervals.sampled(curve, coarse, values, clock.of_frames(curve))
+    sample = intervals.sampled(curve, coarse, values, clock.frame_phases(curve))
     constant = np.full(len(sample.value), intervals.CONSTANT)
     constant[kinematics.QUANTITIES.index("body_length")] = CONSTANT_LENGTH
     found = intervals.intervals(sample, level, constant)

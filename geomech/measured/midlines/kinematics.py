@@ -61,7 +61,7 @@ class Clock:
             return np.unwrap(np.angle(z))
         return near + np.angle(z * np.exp(-1j * near))
 
-    def of_frames(self, curve: Curve) -> np.ndarray:
+    def frame_phases(self, curve: Curve) -> np.ndarray:
         """Return the phase (F,) of a curve at the frames, rad, which grows."""
         phase = np.maximum.accumulate(self.phase(curve))
         return np.interp(curve.t, self.t, phase)

@@ -86,7 +86,7 @@ def compare(fit: Kinematics, medium: Any, effects: tuple = ()) -> Comparison:
         fit.curve,
         fit.coarse,
         partial(values, swimmer),
-        fit.clock.of_frames(fit.curve),
+        fit.clock.frame_phases(fit.curve),
         RESAMPLED,
     )
     found = intervals.intervals(sample, fit.level)
@@ -215,7 +215,7 @@ def _bends(
     wave = np.arange(HARMONICS + 1)[:, None]
     places = (np.arange(elements) + 0.5) / elements * (1 + tail + head) - tail
     inside = np.clip(places, 0.0, 1.0)
-    spectrum = _at(spectrum, inside)
+    spectrum = _headings_at(spectrum, inside)
     if (tail or head) and not straight:
         first = kinematics.averages(cycles).weighted(weights).first
         turns = kinematics.wave_sign(first.mean(0)) / kinematics.arc_waves(first)
@@ -226,7 +226,7 @@ def _bends(
     return alpha, alphadot
 
 
-def _at(headings: np.ndarray, places: np.ndarray) -> np.ndarray:
+def _headings_at(headings: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Return headings at other places along the body, by Legendre polynomials through
     those at equal parts."""
     from numpy.polynomial import legendre

@@ -75,7 +75,7 @@ UNTRACKED = {  # what to do about animals that a file does not tell apart
     SLEAP: "track them in SLEAP and export again, or export one of them",
     "": "add a column track with the name of each, or give each a file",
 }
-WHAT = (
+HEADERS = (
     "give a CSV file with a header such as t,point,x,y or t,x1,y1,x2,y2, or one of"
     " DeepLabCut"
 )
@@ -155,7 +155,7 @@ def read(
             in_range(f"``{name}``", value, low, high)
     if units is not None:
         choose("``units``", units, (*LENGTHS, "px", "BL"))
-    source = read_rows(path, LARGEST_FILE, WHAT)
+    source = read_rows(path, LARGEST_FILE, HEADERS)
     table = _selected(_table(source, individual), source.name, points)
     _check(table, source.name)
     unit, size, notes = _unit(table, source.name, units, scale)
@@ -262,7 +262,7 @@ def _table(source: Rows, individual: str | None = None) -> Table:
     if {"x", "y"} <= {*bare}:
         table = _long(source, header, bare)
     else:
-        table = _wide(source, header, _pairs(header), program)
+        table = _parse_wide(source, header, _pairs(header), program)
     if is_sleap and not table.unit:
         table = table._replace(unit="px")
     least_score = -math.inf
@@ -388,7 +388,8 @@ def _cells(source: Rows, picks: Sequence[int]) -> np.ndarray:
             raise Refusal(
                 f"{len(cells)} cells under {width} columns",
                 where=f"{source.name}, line {line}",
-                instead="mend that row; a point that was not found is an empty cell between two"
+                instead="mend that row; a point that was not found is an empty cell "
+                "between two"
                 " separators",
             )
         for j, pick in enumerate(picks):
@@ -512,7 +513,7 @@ def _check_once(t, frame, point, names, source: Rows) -> None:
         )
 
 
-def _wide(
+def _parse_wide(
     source: Rows,
     header: tuple[str, ...],
     pairs: dict[str, dict[str, int]],
@@ -524,17 +525,17 @@ def _wide(
             "no columns of points",
             where=source.place,
             because=f"it has {formatted(', '.join(header), 120)}",
-            instead=WHAT,
+            instead=HEADERS,
         )
     clock, second, timed = _clock(header, source.place)
     names = []
     for columns in pairs.values():
         names += [header[columns["x"]], header[columns["y"]]]
     unit = _common_unit(names, source.place)
-    return _framed(source, header, pairs, (clock, second, timed), unit, program)
+    return _parse_frames(source, header, pairs, (clock, second, timed), unit, program)
 
 
-def _framed(
+def _parse_frames(
     source: Rows,
     header: Sequence[str],
     pairs: dict[str, dict[str, int]],
@@ -612,7 +613,9 @@ def _deeplabcut(source: Rows, individual: str | None) -> Table:
     kept = ["frame", *("" for _ in animals)]
     for k in columns:
         kept[k + 1] = header[k + 1]
-    table = _framed(source, kept, _pairs(kept), (0, "frame", False), "px", DEEPLABCUT)
+    table = _parse_frames(
+        source, kept, _pairs(kept), (0, "frame", False), "px", DEEPLABCUT
+    )
     return table._replace(
         unused=(), least_score=LEAST_SCORE, notes=(*table.notes, *notes)
     )

@@ -1,5 +1,5 @@
-"""The result of a trial of midlines: quantities with intervals, along the body, by cycle, and
-as predicted."""
+"""The result of a trial of midlines: quantities with intervals, along the body, by
+cycle, and as predicted."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ LABELS = {
     "wavelength": "along the way",
     "arc_wavelength": "along the body",
 }
-SOURCES = "cycles", "noise", "smoothing"  # of errors
+SOURCES = ("cycles", "noise", "smoothing")  # of errors
 
 
 def units_of(fit: Kinematics) -> dict[str, str]:
     """Return the unit of each quantity."""
-    time, length = fit.trial.unit_of_time, fit.trial.unit
-    speed = "m" if length == "m" else "BL"
+    time = fit.trial.unit_of_time
+    length, _ = _unit_of_track(fit)
     return {
         "frequency": "Hz" if time == "s" else "1/frame",
         "body_length": fit.trial.unit_of_length,
-        "speed": f"{speed}/{time}",
+        "speed": f"{length}/{time}",
         "stride": "BL",
         "heading": "rad",
         "drift": "rad",
@@ -50,7 +50,7 @@ def units_of(fit: Kinematics) -> dict[str, str]:
     }
 
 
-def of_trial(fit: Kinematics, comparison: Comparison | None = None) -> Result:
+def trial_result(fit: Kinematics, comparison: Comparison | None = None) -> Result:
     """Return all numbers of a trial. The errors are half widths of intervals."""
     units = units_of(fit)
     label = f"half width of the interval of {100 * fit.level:.3g} % of cases"
@@ -68,11 +68,12 @@ def of_trial(fit: Kinematics, comparison: Comparison | None = None) -> Result:
 
 
 def _quantities(fit: Kinematics, units: dict[str, str], label: str) -> list[Variable]:
-    found, variables = fit.intervals, []
+    intervals = fit.intervals
+    variables = []
     for k, name in enumerate(QUANTITIES):
         variable = Variable(
-            name, (), found.value[k], units[name], LABELS[name], found.half_width[k],
-            error_label=label,
+            name, (), intervals.value[k], units[name], LABELS[name],
+            intervals.half_width[k], error_label=label,
         )  # fmt: skip
         variables.append(variable)
     noise = float(fit.curve.noise / fit.value("body_length")[0])
@@ -82,32 +83,35 @@ def _quantities(fit: Kinematics, units: dict[str, str], label: str) -> list[Vari
 
 def _along(fit: Kinematics, units: dict[str, str], label: str) -> list[Variable]:
     """Return slip and amplitude along the body."""
-    found, place, n = fit.intervals, (np.arange(PARTS) + 0.5) / PARTS, len(QUANTITIES)
+    intervals = fit.intervals
+    place = (np.arange(PARTS) + 0.5) / PARTS
     on_body = "place on the body, tail 0 to head 1"
     variables = [Variable("s", ("s",), place, "1", on_body)]
-    for name, k in (("slip", n), ("amplitude", n + PARTS)):
-        profile, words = slice(k, k + PARTS), f"{name} of a tenth of the body"
+    first = len(QUANTITIES)  # profiles follow the quantities
+    for name in ("slip", "amplitude"):
+        profile = slice(first, first + PARTS)
         variable = Variable(
-            f"{name}_along", ("s",), found.value[profile], units[name], words,
-            found.half_width[profile], error_label=label,
+            f"{name}_along", ("s",), intervals.value[profile], units[name],
+            f"{name} of a tenth of the body", intervals.half_width[profile],
+            error_label=label,
         )  # fmt: skip
         variables.append(variable)
+        first += PARTS
     return variables
 
 
 def _sources(fit: Kinematics, units: dict[str, str]) -> list[Variable]:
     """Return the standard error by each source."""
-    found = fit.intervals
-    parts = np.stack([found.cycles, found.noise, found.smoothing], -1)
-    each = tuple(units[name] for name in QUANTITIES)
-    over = ("quantity", "source")
+    intervals = fit.intervals
+    parts = np.stack([intervals.cycles, intervals.noise, intervals.smoothing], -1)
     return [
         Variable("quantity", ("quantity",), np.array(QUANTITIES)),
         Variable("source", ("source",), np.array(SOURCES)),
         Variable(
-            "standard_error", over, parts[: len(QUANTITIES)], each, "of each source"
+            "standard_error", ("quantity", "source"), parts[: len(QUANTITIES)],
+            tuple(units[name] for name in QUANTITIES), "of each source",
         ),
-    ]
+    ]  # fmt: skip
 
 
 def _cycles(fit: Kinematics, units: dict[str, str]) -> list[Variable]:
@@ -133,7 +137,8 @@ def _starts(fit: Kinematics) -> np.ndarray:
 
 
 def _mean_cycle(fit: Kinematics) -> list[Variable]:
-    """Return the mean cycle: headings along the body, less their mean over the cycle."""
+    """Return the mean cycle: headings along the body, less their mean over the
+    cycle."""
     headings = fit.cycles(fit.curve).headings
     each = headings - headings.mean((1, 2), keepdims=True)
     error = None
@@ -153,21 +158,26 @@ def _mean_cycle(fit: Kinematics) -> list[Variable]:
 
 
 def _track(fit: Kinematics) -> list[Variable]:
-    """Return the way of the body, and the midlines of its first cycle."""
-    cycles, (unit, size) = fit.cycles(fit.curve), _scale(fit)
-    centre, first = cycles.place.mean(-1) / size, cycles.place[0] / size
-    way, body = ("cycle", "phase"), ("phase", "place")
-    mean, of_first = "mean of the body", "midlines of the first cycle"
+    """Return the track of the body, and the midlines of its first cycle."""
+    unit, size = _unit_of_track(fit)
+    place = fit.cycles(fit.curve).place / size
+    centre = place.mean(-1)
+    first = place[0]
+    track_dims = ("cycle", "phase")
+    midline_dims = ("phase", "place")
+    mean = "mean of the body"
+    of_first = "midlines of the first cycle"
     return [
-        Variable("track_x", way, centre.real, unit, mean),
-        Variable("track_y", way, centre.imag, unit, mean),
-        Variable("midline_x", body, first.real, unit, of_first),
-        Variable("midline_y", body, first.imag, unit, of_first),
+        Variable("track_x", track_dims, centre.real, unit, mean),
+        Variable("track_y", track_dims, centre.imag, unit, mean),
+        Variable("midline_x", midline_dims, first.real, unit, of_first),
+        Variable("midline_y", midline_dims, first.imag, unit, of_first),
     ]
 
 
-def _scale(fit: Kinematics) -> tuple[str, float]:
-    """Return the unit of ways in the world, and its size in the unit of the trial."""
+def _unit_of_track(fit: Kinematics) -> tuple[str, float]:
+    """Return the unit of lengths in the world, and its size in the unit of the
+    trial."""
     if fit.trial.unit == "m":
         return "m", 1.0
     return "BL", fit.value("body_length")[0]
@@ -176,8 +186,8 @@ def _scale(fit: Kinematics) -> tuple[str, float]:
 def _compared(
     fit: Kinematics, c: Comparison, units: dict[str, str], label: str
 ) -> list[Variable]:
-    """Return what is predicted: quantities, how far they are from the measured ones, those
-    of each cycle, and the way."""
+    """Return the prediction: quantities, their distances from the measured ones, the
+    quantities of each cycle, and the track."""
     variables = []
     for k, name in enumerate(COMPARED):
         words = f"{LABELS[name]}, predicted"
@@ -190,44 +200,46 @@ def _compared(
         variables.append(_per_cycle(name, each, units[name], "_predicted"))
     both = np.hypot(c.measured_error, c.predicted_error)
     with np.errstate(divide="ignore", invalid="ignore"):
-        apart = np.abs(c.measured - c.predicted) / both
+        distance = np.abs(c.measured - c.predicted) / both
     over = ("compared",)
-    unit, _ = _scale(fit)
-    way, where = _predicted_track(fit, c), "of the body when a cycle begins, predicted"
+    unit, _ = _unit_of_track(fit)
+    track = _predicted_track(fit, c)
+    label = "of the body when a cycle begins, predicted"
     return [
         *variables,
         Variable("compared", over, np.array(COMPARED)),
         Variable(
-            "apart", over, apart, "1",
+            "apart", over, distance, "1",
             "distance of measured and predicted over the errors of both together",
         ),
-        Variable("track_x_predicted", ("begin",), way.real, unit, where),
-        Variable("track_y_predicted", ("begin",), way.imag, unit, where),
+        Variable("track_x_predicted", ("begin",), track.real, unit, label),
+        Variable("track_y_predicted", ("begin",), track.imag, unit, label),
     ]  # fmt: skip
 
 
 def _predicted_track(fit: Kinematics, c: Comparison) -> np.ndarray:
-    """Return where the body is when cycles begin, and at the end of the last, as predicted
-    (C + 1,), x + i y, from where it was at the start."""
-    cycles, (_, size) = fit.cycles(fit.curve), _scale(fit)
+    """Return where the body is when cycles begin, and at the end of the last, as
+    predicted (C + 1,), x + i y, from where it was at the start."""
+    cycles = fit.cycles(fit.curve)
+    _, size = _unit_of_track(fit)
     values = dict(zip(COMPARED, c.predicted))
-    count, length = len(cycles.duration), fit.value("body_length")[0]
-    turned = values["turn"] * (np.arange(count) - (count - 1) / 2)
-    steps = np.exp(1j * (values["heading"] + turned)) * values["stride"] * length / size
+    n_cycles = len(cycles.duration)
+    length = fit.value("body_length")[0]
+    turns = values["turn"] * (np.arange(n_cycles) - (n_cycles - 1) / 2)
+    steps = np.exp(1j * (values["heading"] + turns)) * values["stride"] * length / size
     start = complex(*cycles.starts[0, :2]) / size
     return np.concatenate([[0.0], np.cumsum(steps)]) + start
 
 
 def _closing(c: Comparison, label: str) -> list[Variable]:
-    """Return which values of the medium's parameters give the measured stride."""
+    """Return the values of the medium's parameters that give the measured stride."""
     if not c.closing:
         return []
     over = ("parameter",)
     units = same_or_each([x.unit.replace("-", "1") or "1" for x in c.closing])
     tried = np.array([[x.low, x.high] for x in c.closing], float)
-    value, error = (
-        np.array([getattr(x, n) for x in c.closing]) for n in ("value", "error")
-    )
+    value = np.array([x.value for x in c.closing])
+    error = np.array([x.error for x in c.closing])
     present = np.array([x.present for x in c.closing])
     return [
         Variable("parameter", over, np.array([x.name for x in c.closing])),
@@ -238,13 +250,18 @@ def _closing(c: Comparison, label: str) -> list[Variable]:
             error, error_label=label,
         ),
         Variable("bound", ("bound",), np.array(["low", "high"])),
-        Variable("parameter_tried", ("parameter", "bound"), tried, units, "range tried"),
+        Variable(
+            "parameter_tried", ("parameter", "bound"), tried, units, "range tried"
+        ),
     ]  # fmt: skip
 
 
 def _about(fit: Kinematics, comparison: Comparison | None) -> dict[str, Any]:
     """Return facts about a trial."""
-    trial, curve = fit.trial, fit.curve
+    trial = fit.trial
+    curve = fit.curve
+    duration = trial.t[-1] - trial.t[0]
+    n_cycles = duration * fit.value("frequency")[0]
     about = {
         "form": "midlines",
         "title": f"Kinematics of the midlines {trial.name}",
@@ -255,12 +272,10 @@ def _about(fit: Kinematics, comparison: Comparison | None) -> dict[str, Any]:
         "cycles_left_out": len(fit.marks) - 1 - len(fit.used),
         "head": fit.head,
         "modes": int(curve.modes),
-        "knots_per_cycle": float(
-            (len(curve.knots) - 11)
-            / ((trial.t[-1] - trial.t[0]) * fit.value("frequency")[0])
-        ),
+        "knots_per_cycle": float((len(curve.knots) - 11) / n_cycles),
         "level": float(fit.level),
-        "frame_meaning": "mean of the body's points and mean heading; heading counter-clockwise from x",
+        "frame_meaning": "mean of the body's points and mean heading; heading "
+        "counter-clockwise from x",
     }
     if comparison is not None:
         about["medium"] = type(comparison.medium).__name__.lower()

@@ -101,7 +101,7 @@ class Curve:
         frames = len(self.t)
         drawn = self.residual[rng.integers(frames, size=frames)]
         rows = drawn * rng.choice([-1.0, 1.0], (frames, 1, 1))
-        effect = self.solver(_alike(rows, self.alike))
+        effect = self.solver(_ar1_filtered(rows, self.alike))
         return replace(self, coefficients=self.coefficients + effect)
 
     def repeating(self, phase: np.ndarray) -> Curve:
@@ -126,7 +126,7 @@ class Curve:
         return replace(self, coefficients=self.solver(found))
 
 
-def _alike(rows: np.ndarray, correlation: float) -> np.ndarray:
+def _ar1_filtered(rows: np.ndarray, correlation: float) -> np.ndarray:
     """Return rows (F, ...) of the variance of independent ones, k apart correlated by
     the k-th power of a number."""
     from scipy.signal import lfilter
@@ -332,7 +332,7 @@ def _least(
     """Return the least score of generalised cross-validation, its modes, and its rows
     between knots."""
     z, _, left = projected(trial.points, s, tried[-1], even)
-    count = trial.known
+    count = trial.n_observed
     scores = []
     for step, solver in solvers.items():
         smoothed = solver.smoothed(z.reshape(len(z), -1)).reshape(z.shape)
@@ -384,12 +384,12 @@ def _curve(
     # more it is, the more of it a spline takes along.
     alike = _correlation(left)
     drawn = np.random.default_rng(0).normal(size=(len(trial.t), 2 * NODES))
-    correlated = _alike(drawn, alike)
+    correlated = _ar1_filtered(drawn, alike)
     remaining = ((correlated - solver.smoothed(correlated)) ** 2).sum()
     white = ((drawn - solver.smoothed(drawn)) ** 2).sum()
     free = 1 - solver.count / len(trial.t)
     residual = residual / np.sqrt(free * remaining / white)
-    noise = np.sqrt(((left**2).sum() + (residual**2).sum()) / trial.known)
+    noise = np.sqrt(((left**2).sum() + (residual**2).sum()) / trial.n_observed)
     return Curve(
         trial.t,
         s,

@@ -76,7 +76,7 @@ class Trial:
         return replace(self, notes=(*self.notes, *notes), **changes)
 
     @property
-    def known(self) -> int:
+    def n_observed(self) -> int:
         """Number of coordinates that the tracker gave."""
         missing = self.filled
         if missing is None:
