@@ -50,7 +50,7 @@ def lab(
     three tiers with their errors."""
     from geomech import pipeline
     from geomech.core.summary import wrapped
-    from geomech.lab import check_format, opened, write
+    from geomech.lab import check_format, page_path, write
     from geomech.studies.lab import GALLERY, Lab
     from rft.core.refusal import in_line
 
@@ -59,7 +59,7 @@ def lab(
     scenes = load_scenes(names or GALLERY)
     request = Lab(scenes, parameters(over or (), scenes[0]))
     inputs = request.inputs()
-    with opened(out) as path:
+    with page_path(out) as path:
         request.check()
         outputs = [pipeline.Output(path, write)]
         pipeline.refuse_unwritable(outputs, inputs)
