@@ -131,7 +131,7 @@ def draw(numbers: dict):
     style.entry(axes[0, 1], "tension cut", ls="--")
     axes[0, 1].legend(loc="upper left")
     draw_ratios(axes[1, 1], numbers)
-    style.lettered(axes)
+    style.letter_panels(axes)
     return fig
 
 

@@ -106,7 +106,7 @@ def draw(numbers: dict):
     draw_trace(axes[0, 1], numbers["one"])
     draw_lag(axes[1, 0], numbers)
     draw_speed(axes[1, 1], numbers)
-    style.lettered(axes)
+    style.letter_panels(axes)
     return fig
 
 

@@ -310,7 +310,7 @@ def draw(numbers: dict):
     right.set_yticks(y, [name.replace(", ", ",\n") for name in numbers["bars"]])
     right.set(xlabel="lift over drag", ylim=(len(y) - 0.5, -1.6), xlim=(-1.2, 1.8))
     right.legend(loc="upper left", ncols=2, columnspacing=0.5)
-    style.lettered(axes)
+    style.letter_panels(axes)
     return fig
 
 

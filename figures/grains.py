@@ -303,7 +303,7 @@ def table(numbers: dict) -> str:
 def draw(numbers: dict):
     fig, axes = plots.figure(9.0, 6.4, 2, 2)
     (left, right), (lift_axes, reversal_axes) = axes
-    style.lettered(axes)
+    style.letter_panels(axes)
     draw_circles(left, numbers)
     draw_others(right, numbers)
     draw_lift(lift_axes, numbers["lift"])
