@@ -1,8 +1,8 @@
-"""Fig. 5(c): drag along and across a rod against its attack angle, in dry grains and in a
-viscous fluid.
+"""Fig. 5(c): drag along and across a rod against its attack angle, in dry grains and in
+a viscous fluid.
 
-Forces are in units of the axial drag 2 k rho g r |z| per length. Dots: drag on a rod in a
-discrete-element bed of 6 mm grains (the sample short-rod-drag), with the granular law
+Forces are in units of the axial drag 2 k rho g r |z| per length. Dots: drag on a rod in
+a discrete-element bed of 6 mm grains (the sample short-rod-drag), with the granular law
 fitted to it.
 """
 
@@ -31,8 +31,8 @@ LAWS = {  # law, colour, label
 
 
 def compute(angles: int = 181) -> dict:
-    """Return psi (N,) in rad, drag along and across (2, N) by each law, the forces in the
-    bed and the law fitted to them."""
+    """Return psi (N,) in rad, drag along and across (2, N) by each law, the forces in
+    the bed and the law fitted to them."""
     psi = np.linspace(0.0, np.pi / 2, angles)
     numbers: dict = {"psi": psi}
     for name, (law, _, _) in LAWS.items():

@@ -1,16 +1,16 @@
 """Fig. 6(b): drag and lift stress on a plate against its depth, for some tilts and
 directions of motion.
 
-The stress is the force over the area of the plate, sigma = F / A, against the depth of its
-middle. While the plate crosses the surface, the stress rises with the square of the
+The stress is the force over the area of the plate, sigma = F / A, against the depth of
+its middle. While the plate crosses the surface, the stress rises with the square of the
 submerged length. Once the plate is under (shaded for all tilts), it is
 |z| alpha(beta, gamma), a straight line through the origin, as Sec. II B states for all
-media, tilts and directions. On the way up (gamma < 0) grains hold a level plate down, in
-the generic map with a quarter of their resistance on the way down.
+media, tilts and directions. On the way up (gamma < 0) grains hold a level plate down,
+in the generic map with a quarter of their resistance on the way down.
 
-The size of the plate, the medium, the angles and the greatest depth of the published panel
-are not in the text: assumed. The bottom of the bed, where the measured stress leaves the
-line, is not modelled.
+The size of the plate, the medium, the angles and the greatest depth of the published
+panel are not in the text: assumed. The bottom of the bed, where the measured stress
+leaves the line, is not modelled.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ def compute(
     """Return stresses on each plate against depth.
 
     "depth": (D,) of its middle, m. "plates": by (beta, gamma) in degrees {"sigma_x",
-    "sigma_z": (D,), Pa, against the motion and upwards, "alpha": (2,) slopes of both once
-    the plate is under, N/cm^3}. "under": depth at which all plates are under, m.
+    "sigma_z": (D,), Pa, against the motion and upwards, "alpha": (2,) slopes of both
+    once the plate is under, N/cm^3}. "under": depth at which all plates are under, m.
     """
     depth = np.linspace(0.0, DEEPEST, depths)
     pose = np.stack([0 * depth, -depth, 0 * depth], -1)

@@ -1,12 +1,12 @@
-"""Fig. 7(b) to (d): the nine coefficients of stress per depth, and the two maps that they
-give.
+"""Fig. 7(b) to (d): the nine coefficients of stress per depth, and the two maps that
+they give.
 
 The first panel shows the convention of plate, motion and stress (Fig. 6(a)). The second
-compares the generic set M0 with media whose nine coefficients are known, each divided by
-the medium's strength zeta: this one number takes one medium to the other. The maps are
-those of M0, hatched where the grains would pull on the leading face. Coefficients and zeta
-are those of `rft.terradynamics.plates.VERTICAL`; of the other media of the published panel
-only zeta is known.
+compares the generic set M0 with media whose nine coefficients are known, each divided
+by the medium's strength zeta: this one number takes one medium to the other. The maps
+are those of M0, hatched where the grains would pull on the leading face. Coefficients
+and zeta are those of `rft.terradynamics.plates.VERTICAL`; of the other media of the
+published panel only zeta is known.
 """
 
 from __future__ import annotations
@@ -76,8 +76,8 @@ def draw(numbers: dict):
 
 
 def draw_convention(ax) -> None:
-    """Draw a plate at beta = 35 degrees that moves at gamma = 30 degrees, and the force on
-    it in the generic map."""
+    """Draw a plate at beta = 35 degrees that moves at gamma = 30 degrees, and the force
+    on it in the generic map."""
     beta = np.radians(35)
     gamma = np.radians(30)
     middle = np.array([0.0, -0.85])
@@ -113,7 +113,8 @@ def draw_convention(ax) -> None:
 def draw_vector(
     ax, start, vector, colour: str, label: str, offset, side: str = "left"
 ) -> None:
-    """Draw a vector with its label next to the tip. side: of the label that is there."""
+    """Draw a vector with its label next to the tip. side: of the label that is
+    there."""
     look = {"color": colour, "lw": 1.4, "shrinkA": 0, "shrinkB": 0}
     tip = start + vector
     ax.annotate("", tip, start, arrowprops={"arrowstyle": "-|>", **look})

@@ -1,5 +1,5 @@
-"""Fig. 11(e): displacement per cycle of circle and butterfly gaits against amplitude, by
-every tier.
+"""Fig. 11(e): displacement per cycle of circle and butterfly gaits against amplitude,
+by every tier.
 
 The tiers are the CCF of the uniform fit, the CCF adapted to the family of gaits, path
 integrals, and the force balance.

@@ -1,9 +1,12 @@
-"""The effects of grains and ground on the force on the c-leg of Fig. 8(b) in loose poppy seeds.
+"""The effects of grains and ground on the force on the c-leg of Fig. 8(b) in loose
+poppy seeds.
 
-Left: the force that the inertia of grains adds, rms over the turn, over the rms force without it, against the rate, for
-lambda of 1 to 4; it is seen above some 230 rpm (dashed). Middle: peak lift over that in still, level ground against air
-speed over that of fluidisation, and against slope over the angle of repose, where the leg sweeps down the slope and where it
-sweeps up. Right: lift against angle with an earlier intrusion before the leg.
+Left: the force that the inertia of grains adds, rms over the turn, over the rms force
+without it, against the rate, for lambda of 1 to 4; it is seen above some 230 rpm
+(dashed). Middle: peak lift over that in still, level ground against air speed over that
+of fluidisation, and against slope over the angle of repose, where the leg sweeps down
+the slope and where it sweeps up. Right: lift against angle with an earlier intrusion
+before the leg.
 """
 
 from __future__ import annotations
@@ -28,9 +31,10 @@ def compute(
     strengths=(1.0, 2.0, 4.0),
     shares=(0, 0.2, 0.4, 0.6, 0.8),
 ) -> dict:
-    """Return rates (R,), rpm; added (S, R); at (S,): the rate at which SHARE is added. shares (N,), aerated, rising and
-    falling (N,): peaks of the lift over that without, on ground that rises or falls ahead of the robot by shares of
-    REPOSE. angle (T,), rad; lift {place: (T,)}, N."""
+    """Return rates (R,), rpm; added (S, R); at (S,): the rate at which SHARE is added.
+    shares (N,), aerated, rising and falling (N,): peaks of the lift over that without,
+    on ground that rises or falls ahead of the robot by shares of REPOSE. angle (T,),
+    rad; lift {place: (T,)}, N."""
     leg = load("c-leg")
     without = leg.run()
     size = np.sqrt((without.force**2).sum(-1).mean())

@@ -1,8 +1,9 @@
-"""Midlines of a trial: the kinematics of an undulator in glass beads with intervals, and
-the speed that the balance of forces predicts for its shapes.
+"""Midlines of a trial: the kinematics of an undulator in glass beads with intervals,
+and the speed that the balance of forces predicts for its shapes.
 
 The trial is computed in loose beads, so that the truth is known: 30 points with 1 % of
-noise, a swing and a number of waves that vary by 5 %, and a frequency that varies by 2 %.
+noise, a swing and a number of waves that vary by 5 %, and a frequency that varies by 2
+%.
 The prediction is for close beads.
 """
 
@@ -24,8 +25,8 @@ from rft import Backbone
 def compute(
     medium: str = "glass-0.3mm-close", cycles: float = 8.4, seed: int = 1
 ) -> Result:
-    """Return the kinematics of a synthetic trial in loose beads, with the prediction for a
-    medium."""
+    """Return the kinematics of a synthetic trial in loose beads, with the prediction
+    for a medium."""
     swimmer = Swimmer(MEDIA["glass-0.3mm-loose"], Backbone(40))
     trial = synthetic_midlines(swimmer, cycles, seed=seed).trial("trial.csv")
     fit = fit_midlines(trial)

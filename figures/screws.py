@@ -1,4 +1,5 @@
-"""Screws in sand by the law of three dimensions: what one pulls against slip, and how craft on two of them go.
+"""Screws in sand by the law of three dimensions: what one pulls against slip, and how
+craft on two of them go.
 
 The craft is that of the built-in scene ``screws``; it and its sand are assumed. Lines
 are the balance in the mean over a turn, without inertia
@@ -37,10 +38,12 @@ def compute(
 ) -> dict:
     """Return what a screw pulls, how far craft advance a turn, and their paths.
 
-    slip, pulled {height: Turning}; pitch, advance {mass: (P,)}, m a turn; found (T,): MuJoCo's at the pitches ``tried`` with
-    the scene's mass; paths {(pair, mass): (time, x, y, Cruise)}, s and m.
+    slip, pulled {height: Turning}; pitch, advance {mass: (P,)}, m a turn; found (T,):
+    MuJoCo's at the pitches ``tried`` with the scene's mass; paths {(pair, mass):
+    (time, x, y, Cruise)}, s and m.
     """
-    scene, slip = load("screws"), np.linspace(-0.2, 1.0, slips)
+    scene = load("screws")
+    slip = np.linspace(-0.2, 1.0, slips)
     fineness = fineness or scene.numerics
     triangles = PER_SQUARE * fineness.elements**2
     of = lambda mass, pitch: dataclasses.replace(
@@ -81,10 +84,8 @@ def compute(
 
 def table(numbers: dict) -> str:
     """Return what MuJoCo finds beside the balance."""
-    lines, by_balance = (
-        [],
-        np.interp(numbers["tried"], numbers["pitch"], numbers["advance"][1.0]),
-    )
+    lines = []
+    by_balance = np.interp(numbers["tried"], numbers["pitch"], numbers["advance"][1.0])
     for p, found, expected in zip(numbers["tried"], numbers["found"], by_balance):
         lines.append(
             f"pitch {p:g} m: advance {found:.4g} m a turn by MuJoCo, {expected:.4g} by the balance"

@@ -1,5 +1,5 @@
-"""The common look of the figures: colours by role, grey guides, axes of a phase, legends,
-tables of numbers."""
+"""The common look of the figures: colours by role, grey guides, axes of a phase,
+legends, tables of numbers."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-# Colours of Okabe and Ito (Color Universal Design, 2008), which colour-blind readers tell
-# apart; in print without colour, markers do.
+# Colours of Okabe and Ito (Color Universal Design, 2008), which colour-blind readers
+# tell apart; in print without colour, markers do.
 BLACK = "black"
 BLUE = "#0072B2"
 GREEN = "#009E73"
@@ -27,15 +27,16 @@ QUARTERS = ("0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$")
 
 
 def shades(count: int) -> list:
-    """Return colours of an ordered quantity, dark to light, in order in grey as well."""
+    """Return colours of an ordered quantity, dark to light, in order in grey as
+    well."""
     from cmcrameri import cm
 
     return [cm.batlow(x) for x in np.linspace(0.0, 0.8, count)]
 
 
 def sparse(k: int, points: int) -> dict:
-    """Return the look of curve ``k`` of several without an order: a colour, and a marker
-    at four of its points."""
+    """Return the look of curve ``k`` of several without an order: a colour, and a
+    marker at four of its points."""
     # Each curve starts elsewhere, so that markers of equal curves do not coincide.
     first = points // 8 + k * points // 40
     return {
@@ -89,7 +90,8 @@ def letter_panels(axes) -> None:
 
 
 def entry(ax, label: str, **look) -> None:
-    """Add an entry to the legend for a look that several curves share, grey by default."""
+    """Add an entry to the legend for a look that several curves share, grey by
+    default."""
     ax.plot([], [], label=label, **{"color": "0.3", **look})
 
 
@@ -104,8 +106,8 @@ def legend_right(ax, **more) -> None:
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return lines of text with the cells under their heads, the first column aligned to
-    the left and the others to the right."""
+    """Return lines of text with the cells under their heads, the first column aligned
+    to the left and the others to the right."""
     lines = [heads, *rows]
     first_width, *widths = (max(map(len, column)) for column in zip(*lines))
     text = []
