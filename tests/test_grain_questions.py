@@ -579,7 +579,9 @@ def test_plates_in_grains_stand_beside_bars_and_the_map():
     assert deep["weight"].sum() == pytest.approx(
         np.pi * campaign.BAR * campaign.TROUGH.length
     )  # half the bar's surface
-    one = figure.lift_over_drag(bar, bar["beta"], bar["normal"][:, 1], bar["tangent"][:, 1])
+    one = figure.lift_over_drag(
+        bar, bar["beta"], bar["normal"][:, 1], bar["tangent"][:, 1]
+    )
     assert one == pytest.approx(bar["lift"][:, 1].sum() / bar["drag"][:, 1].sum())
     pulls = maps["keep"]["normal"] < 0
     assert (
