@@ -1,7 +1,9 @@
-"""Published figures, one importable script each: compute() -> numbers, draw(numbers) -> Figure.
+"""Published figures, one importable script each: compute() -> numbers, draw(numbers) ->
+Figure.
 
-`python -m figures.fig11e_displacement [FILE]` draws one to FILE (.png, .pdf or .svg). Some have table(numbers) -> text,
-which is printed too. What they look alike in is in `figures.style`.
+`python -m figures.fig11e_displacement [FILE]` draws one to FILE (.png, .pdf or .svg).
+Some have table(numbers) -> text, which is printed. Their common look is in
+`figures.style`.
 """
 
 from __future__ import annotations
@@ -13,11 +15,15 @@ from collections.abc import Callable
 def main(
     name: str, compute: Callable, draw: Callable, table: Callable | None = None
 ) -> None:
-    """Compute, draw and save to the file named on the command line, or to <name>.png; print the table if there is one."""
+    """Compute, draw and save to the file named on the command line, or to <name>.png;
+    print the table if there is one."""
     from geomech import plots
 
+    file = f"{name}.png"
+    if len(sys.argv) > 1:
+        file = sys.argv[1]
     try:
-        path = plots.check_format(sys.argv[1] if len(sys.argv) > 1 else f"{name}.png")
+        path = plots.check_format(file)
     except ValueError as error:
         print(error, file=sys.stderr)
         raise SystemExit(2) from None

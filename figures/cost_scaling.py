@@ -1,5 +1,6 @@
-"""The cost of a balance of forces: microseconds a sample against the size of a batch, by both back ends, on one core and on
-all, beside the usual loop of SciPy's; and time against links, directions and phases, with fitted exponents."""
+"""The cost of a balance of forces: microseconds a sample against the size of a batch,
+by both back ends, on one core and on all, beside the usual loop of SciPy's; and time
+against links, directions and phases, with fitted exponents."""
 
 from __future__ import annotations
 
@@ -22,11 +23,13 @@ GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 NAMES = {"numpy": "NumPy", "numba": "compiled"}
 LOOKS = {"NumPy": (style.BLUE, "o"), "compiled": (style.VERMILION, "s")}
 REPEATS = 3
-TAN2, C = np.tan(np.radians(13.8)) ** 2, 1.8
+TAN2 = np.tan(np.radians(13.8)) ** 2
+C = 1.8
 
 
 def one_scipy_solve(alpha, alphadot, segments=20):
-    """Solve one balance as one would by hand: midpoint segments in the middle link's frame, Eqs. 2-3 as printed, fsolve."""
+    """Solve one balance as one would by hand: midpoint segments in the middle link's
+    frame, Eqs. 2-3 as printed, fsolve."""
     half = 1 / 6
     s = ((np.arange(segments) + 0.5) / segments * 2 - 1) * half
     headings = np.array([-alpha[0], 0.0, alpha[1]])
@@ -42,7 +45,8 @@ def one_scipy_solve(alpha, alphadot, segments=20):
         swing = turns[:, None, None] * np.stack([-arms[..., 1], arms[..., 0]], -1)
         v = xi[:2] + spin + swing
         v = v / (np.sqrt((v**2).sum(-1, keepdims=True)) + 1e-12)
-        vn, vt = (v * n).sum(-1, keepdims=True), (v * t).sum(-1, keepdims=True)
+        vn = (v * n).sum(-1, keepdims=True)
+        vt = (v * t).sum(-1, keepdims=True)
         f = (1 + C / np.sqrt(TAN2 + vn**2)) * vn * n + vt * t
         moment = place[..., 0] * f[..., 1] - place[..., 1] * f[..., 0]
         return [f[..., 0].sum(), f[..., 1].sum(), moment.sum()]
@@ -64,14 +68,16 @@ def quickest(f: Callable, repeats: int = REPEATS) -> float:
 
 def random_samples(links: int, count: int):
     """Return shapes and rates (count, links - 1) within what such a body can bend."""
-    rng, spread = np.random.default_rng(links), 2.5 / np.sqrt(links / 3)
+    rng = np.random.default_rng(links)
+    spread = 2.5 / np.sqrt(links / 3)
     return rng.uniform(-spread, spread, (count, links - 1)), rng.normal(
         size=(count, links - 1)
     )
 
 
 def solver(how: str, threads: int | None = None) -> Callable:
-    """Return the velocity of a chain in loose glass by a back end, None for all threads."""
+    """Return the velocity of a chain in loose glass by a back end, None for all
+    threads."""
 
     def velocity(alpha, alphadot):
         chain = Chain((1,) * (np.shape(alpha)[-1] + 1))
@@ -85,8 +91,10 @@ def solver(how: str, threads: int | None = None) -> Callable:
 
 
 def batches(scale: int) -> dict:
-    """Return the seconds of a batch, by back end and cores, and of SciPy's loop the seconds of a sample."""
-    sizes, series = [max(1, n // scale) for n in (1, 8, 64, 512, 4096, 32768)], {}
+    """Return the seconds of a batch, by back end and cores, and of SciPy's loop the
+    seconds of a sample."""
+    sizes = [max(1, n // scale) for n in (1, 8, 64, 512, 4096, 32768)]
+    series = {}
     for how in backends():
         for threads, cores in ((1, "one core"), (None, f"{os.cpu_count()} cores")):
             velocity = solver(how, threads)
@@ -103,7 +111,8 @@ def batches(scale: int) -> dict:
 
 
 def compute(scale: int = 1) -> dict:
-    """Return {axis: {"x": [...], "seconds": {series: [...]}, "exponent": p}}, the exponent being NumPy's over the larger half.
+    """Return {axis: {"x": [...], "seconds": {series: [...]}, "exponent": p}}, the
+    exponent being NumPy's over the larger half.
 
     The axis "samples" has "loop", too. scale: divides all sizes.
     """
@@ -139,7 +148,8 @@ def compute(scale: int = 1) -> dict:
 def draw(numbers: dict):
     fig, axes = plots.figure(10.6, 3.0, 4, width_ratios=(1.7, 1, 1, 1))
     for ax, (axis, found) in zip(axes[0], numbers.items()):
-        x, loop = np.array(found["x"], float), found.get("loop")
+        x = np.array(found["x"], float)
+        loop = found.get("loop")
         per = x / 1e6 if loop else np.ones_like(x)  # microseconds a sample, or seconds
         for name, seconds in found["seconds"].items():
             colour, marker = LOOKS[name.partition(",")[0]]

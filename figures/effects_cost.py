@@ -1,7 +1,9 @@
-"""The cost of effects: time of one cycle of the sandfish with effects switched on one at a time, over that with none.
+"""The cost of effects: time of one cycle of the sandfish with effects switched on one
+at a time, over that with none.
 
-All from one run, seven amplitudes side by side. Effects that remember, or that give the body mass, take the phases one
-after the other and the cycle several times over until it repeats: that is the cost of the engine, not of the effect.
+All from one run, seven amplitudes side by side. Effects that remember, or that give the
+body mass, take the phases one after the other and the cycle several times over until it
+repeats: that is the cost of the engine, not of the effect.
 """
 
 from __future__ import annotations
@@ -51,21 +53,22 @@ ENGINES = {
 
 
 def compute(phases: int = 64, repeats: int = 5, cycles: int | None = None) -> dict:
-    """Return {name: {"ratio", "engine", "cycles"}}, the ratio being the median over rounds of time over plain time.
+    """Return {name: {"ratio", "engine", "cycles"}}, the ratio being the median over
+    rounds of time over plain time.
 
     cycles: of time stepping; None: as many as it takes to reach the limit cycle.
     """
     fish = load("sandfish-loose").with_numerics(cycles=cycles)
     scenes = {name: fish.changed(effects=effects) for name, effects in SETS.items()}
-    amplitudes, seconds, runs = (
-        np.linspace(0.1, 0.4, 7),
-        {name: [] for name in SETS},
-        {},
-    )
+    amplitudes = np.linspace(0.1, 0.4, 7)
+    seconds = {name: [] for name in SETS}
+    runs = {}
     for repeat in range(repeats + 1):  # the first round warms up
         for name, scene in scenes.items():
             if repeat != 1 and rft.effects.engine(scene.system.effects) != "algebraic":
-                continue  # long enough for one timing to tell, and nothing to warm up that the others have not
+                # long enough for one timing to tell, and nothing to warm up that the
+                # others have not
+                continue
             start = time.perf_counter()
             runs[name] = scene.cycle(amplitudes=amplitudes, phases=phases)
             if repeat:
@@ -84,7 +87,8 @@ def compute(phases: int = 64, repeats: int = 5, cycles: int | None = None) -> di
 @plots.styled
 def draw(numbers: dict):
     fig, axes = plots.figure(5.6, 3.4)
-    ax, names = axes[0, 0], list(numbers)[::-1]
+    ax = axes[0, 0]
+    names = list(numbers)[::-1]
     ratios = [numbers[name]["ratio"] for name in names]
     for engine, (colour, hatch) in ENGINES.items():
         rows = [k for k, name in enumerate(names) if numbers[name]["engine"] == engine]

@@ -1,9 +1,12 @@
-"""Fig. 7(b) to (d): the nine coefficients of stress per depth, and the two maps that they make.
+"""Fig. 7(b) to (d): the nine coefficients of stress per depth, and the two maps that
+they give.
 
-The first panel is the convention of plate, motion and stress (Fig. 6(a)), the second the coefficients of media that have
-nine of their own, each over the medium's zeta, beside the generic set M0: one number, the strength, takes one medium to the
-other. The maps are of M0, hatched where the grains would pull on the face that leads. Coefficients and zeta are those of
-`rft.terradynamics.plates.VERTICAL`; the other media of the published panel have only their zeta there.
+The first panel shows the convention of plate, motion and stress (Fig. 6(a)). The second
+compares the generic set M0 with media whose nine coefficients are known, each divided
+by the medium's strength zeta: this one number takes one medium to the other. The maps
+are those of M0, hatched where the grains would pull on the leading face. Coefficients
+and zeta are those of `rft.terradynamics.plates.VERTICAL`; of the other media of the
+published panel only zeta is known.
 """
 
 from __future__ import annotations
@@ -24,31 +27,38 @@ SCALED = {
 def compute(cells: int = 180) -> dict:
     """Return the nine coefficients and the survey of the generic map.
 
-    "names" and "generic": (9,) of M0, N/cm^3. "media": {name: {"zeta", "coefficients" (9,), "off"}}, the coefficients over
-    zeta, and the rms of their difference from M0 over the rms of M0. "survey": of M0.
+    "names" and "generic": (9,) of M0, N/cm^3. "media": {name: {"zeta", "coefficients"
+    (9,), "off"}}, the coefficients over zeta, and the rms of their difference from M0
+    over the rms of M0. "survey": of M0.
     """
-    values = lambda name: np.array(
-        [getattr(VERTICAL[name].stress, c) for c in COEFFICIENTS]
-    )
-    generic, media = values("generic"), {}
+    generic = coefficients("generic")
+    media = {}
     for name in SCALED:
         zeta = VERTICAL[f"{name}-scaled"].stress.zeta
-        scaled = values(name) / zeta
-        difference = float(
-            np.sqrt(np.mean((scaled - generic) ** 2) / np.mean(generic**2))
-        )
-        media[name] = {"zeta": zeta, "coefficients": scaled, "off": difference}
-    generic_map = survey(VERTICAL["generic"].stress, cells)
+        scaled = coefficients(name) / zeta
+        ratio = np.mean((scaled - generic) ** 2) / np.mean(generic**2)
+        media[name] = {
+            "zeta": zeta,
+            "coefficients": scaled,
+            "off": float(np.sqrt(ratio)),
+        }
     return {
         "names": COEFFICIENTS,
         "generic": generic,
         "media": media,
-        "survey": generic_map,
+        "survey": survey(VERTICAL["generic"].stress, cells),
     }
+
+
+def coefficients(medium: str) -> np.ndarray:
+    """Return the nine coefficients of a medium, N/cm^3."""
+    stress = VERTICAL[medium].stress
+    return np.array([getattr(stress, name) for name in COEFFICIENTS])
 
 
 @plots.styled
 def draw(numbers: dict):
+    """Draw the convention, the coefficients and the two maps."""
     fig, axes = plots.figure(8.4, 6.6, 2, 2)
     draw_convention(axes[0, 0])
     draw_coefficients(axes[0, 1], numbers)
@@ -66,110 +76,77 @@ def draw(numbers: dict):
 
 
 def draw_convention(ax) -> None:
-    """Draw a plate at beta = 35 degrees that moves at gamma = 30 degrees, and the force on it in the generic map."""
-    beta, gamma, middle = np.radians(35), np.radians(30), np.array([0.0, -0.85])
-    along, velocity = (
-        np.array([np.cos(beta), np.sin(beta)]),
-        np.array([np.cos(gamma), -np.sin(gamma)]),
-    )
+    """Draw a plate at beta = 35 degrees that moves at gamma = 30 degrees, and the force
+    on it in the generic map."""
+    beta = np.radians(35)
+    gamma = np.radians(30)
+    middle = np.array([0.0, -0.85])
+    along = np.array([np.cos(beta), np.sin(beta)])
+    velocity = np.array([np.cos(gamma), -np.sin(gamma)])
     a_x, a_z = VERTICAL["generic"].stress(beta, gamma)
     ax.axhspan(-1.6, 0.0, color="#f3ead8", lw=0)
     ax.axhline(0.0, **style.SURFACE)
-    ax.plot(
-        *(middle + 0.45 * np.outer([-1, 1], along)).T,
-        color=style.BLACK,
-        lw=4,
-        solid_capstyle="butt",
+    plate = middle + 0.45 * np.outer([-1, 1], along)
+    ax.plot(*plate.T, color=style.BLACK, lw=4, solid_capstyle="butt")
+
+    drag = 0.9 * np.array([-a_x, 0.0])
+    lift = 0.9 * np.array([0.0, a_z])
+    draw_vector(ax, middle, velocity * 0.75, style.BLUE, "v", (0.05, -0.06))
+    draw_vector(
+        ax, middle, drag, style.VERMILION, r"$-\alpha_x|z|$", (-0.02, 0.05), "right"
     )
-    arrows = (
-        (velocity * 0.75, style.BLUE, "v", (0.05, -0.06)),
-        (
-            0.9 * np.array([-a_x, 0.0]),
-            style.VERMILION,
-            r"$-\alpha_x|z|$",
-            (-0.02, 0.05),
-        ),
-        (0.9 * np.array([0.0, a_z]), style.VERMILION, r"$\alpha_z|z|$", (0.04, 0.0)),
-    )
-    for vector, colour, label, (right, up) in arrows:
-        tip = middle + vector
-        ax.annotate(
-            "",
-            tip,
-            middle,
-            arrowprops={
-                "arrowstyle": "-|>",
-                "color": colour,
-                "lw": 1.4,
-                "shrinkA": 0,
-                "shrinkB": 0,
-            },
-        )
-        side = "right" if vector[0] < 0 else "left"
-        ax.text(tip[0] + right, tip[1] + up, label, color=colour, ha=side, va="center")
-    ax.plot(
-        [middle[0], middle[0] + 0.95], [middle[1]] * 2, color="0.6", lw=0.6, ls="--"
-    )
-    for start, stop, reach, label in (
-        (0.0, beta, 0.34, r"$\beta$"),
-        (-gamma, 0.0, 0.44, r"$\gamma$"),
-    ):
-        turn = np.linspace(start, stop, 40)
-        ax.plot(
-            middle[0] + reach * np.cos(turn),
-            middle[1] + reach * np.sin(turn),
-            color="0.3",
-            lw=0.8,
-        )
-        at = (start + stop) / 2
-        ax.text(
-            middle[0] + (reach + 0.09) * np.cos(at),
-            middle[1] + (reach + 0.09) * np.sin(at),
-            label,
-            va="center",
-        )
-    ax.annotate(
-        "",
-        (-0.85, middle[1]),
-        (-0.85, 0.0),
-        arrowprops={"arrowstyle": "<->", "color": "0.3", "lw": 0.8},
-    )
-    ax.text(-0.82, middle[1] / 2, "|z|", va="center")
+    draw_vector(ax, middle, lift, style.VERMILION, r"$\alpha_z|z|$", (0.04, 0.0))
+    x, z = middle
+    ax.plot([x, x + 0.95], [z, z], color="0.6", lw=0.6, ls="--")
+    draw_angle(ax, middle, 0.0, beta, 0.34, r"$\beta$")
+    draw_angle(ax, middle, -gamma, 0.0, 0.44, r"$\gamma$")
+
+    depth_arrow = {"arrowstyle": "<->", "color": "0.3", "lw": 0.8}
+    ax.annotate("", (-0.85, z), (-0.85, 0.0), arrowprops=depth_arrow)
+    ax.text(-0.82, z / 2, "|z|", va="center")
     ax.text(-0.98, 0.03, "surface", va="bottom", **style.NOTE)
     ax.set(aspect="equal", xlim=(-1, 1.1), ylim=(-1.6, 0.3), xticks=[], yticks=[])
     for spine in ax.spines.values():
         spine.set_visible(False)
 
 
+def draw_vector(
+    ax, start, vector, colour: str, label: str, offset, side: str = "left"
+) -> None:
+    """Draw a vector with its label next to the tip. side: of the label that is
+    there."""
+    look = {"color": colour, "lw": 1.4, "shrinkA": 0, "shrinkB": 0}
+    tip = start + vector
+    ax.annotate("", tip, start, arrowprops={"arrowstyle": "-|>", **look})
+    ax.text(*(tip + offset), label, color=colour, ha=side, va="center")
+
+
+def draw_angle(ax, centre, start: float, stop: float, radius: float, label: str):
+    """Draw the arc of an angle from start to stop, rad, with its label."""
+    arc = np.linspace(start, stop, 40)
+    x, z = centre
+    ax.plot(x + radius * np.cos(arc), z + radius * np.sin(arc), color="0.3", lw=0.8)
+    middle = (start + stop) / 2
+    x_label = x + (radius + 0.09) * np.cos(middle)
+    z_label = z + (radius + 0.09) * np.sin(middle)
+    ax.text(x_label, z_label, label, va="center")
+
+
 def draw_coefficients(ax, numbers: dict) -> None:
-    at = np.arange(len(numbers["names"]))
+    """Draw the coefficients of the media over their strength, and the generic set."""
+    places = np.arange(len(numbers["names"]))
     style.zero_line(ax)
-    ax.plot(
-        at,
-        numbers["generic"],
-        color=style.BLACK,
-        lw=1.5,
-        marker="*",
-        ms=8,
-        label="generic, $M_0$",
-    )
-    for (name, medium), colour, mark in zip(
-        numbers["media"].items(), (style.LOOSE, style.CLOSE), "os"
-    ):
+    line = {"color": style.BLACK, "lw": 1.5, "marker": "*", "ms": 8}
+    ax.plot(places, numbers["generic"], label="generic, $M_0$", **line)
+    looks = zip((style.LOOSE, style.CLOSE), "os")
+    for (name, medium), (colour, marker) in zip(numbers["media"].items(), looks):
         label = rf"{SCALED[name]}, $\zeta$ = {medium['zeta']:.3f}"
-        ax.plot(
-            at,
-            medium["coefficients"],
-            mark,
-            color=colour,
-            mfc="none",
-            ms=5,
-            label=label,
-        )
+        dots = {"color": colour, "mfc": "none", "ms": 5, "label": label}
+        ax.plot(places, medium["coefficients"], marker, **dots)
     labels = [f"${c[0]}_{{{c[1:].replace('m', '-')}}}$" for c in numbers["names"]]
     ax.set(
         ylabel=r"coefficient / $\zeta$ (N/cm$^3$)",
-        xticks=at,
+        xticks=places,
         xticklabels=labels,
         ylim=(-0.16, 0.62),
     )

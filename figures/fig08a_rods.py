@@ -1,16 +1,21 @@
-"""Fig. 8(a): stress around a dragged cylinder by plates, and drag and lift on rods of four shapes against depth.
+"""Fig. 8(a): stress around a dragged cylinder by plates, and drag and lift on rods of
+four shapes against depth.
 
-(a) Resistive force theory takes the stress on a part of a rod for that on a plate of the same tilt at the same depth; the
-text says that the two are nearly equal in discrete-element simulation. The line is the map for plates, the dots the elements
-of a cylinder that moves level: normal stress, positive where the grains push, and tangential stress, positive from the bottom
-of the cylinder to its top. Tilts run from 0 (the underside) through 90 degrees (the front) to 180 (the top); that the
-published angle from 0 to pi starts below is assumed. Its data are not in the text.
+(a) Resistive force theory takes the stress on a part of a rod for that on a plate of
+the same tilt at the same depth; the text says that the two are nearly equal in
+discrete-element simulation. The line is the map for plates, the dots the elements of a
+cylinder that moves level: normal stress, positive where the grains push, and tangential
+stress, positive from the bottom of the cylinder to its top. Tilts run from 0 (the
+underside) through 90 degrees (the front) to 180 (the top); that the published angle
+from 0 to pi starts below is assumed. Its data are not in the text.
 
-(b), (c) Drag and lift against the depth of the rod's axis. (d) Lift over drag deep down, beside the sign that was measured
-(Ding, Gravish and Goldman, Phys. Rev. Lett. 106, 028001 (2011)): up on round and square rods, down on a half cylinder that
-lies on its flat side. The nine-term map says up for all. It pulls on faces that look up by more than 53 degrees, and
-that lifts. Without tension (dashed, open) nothing is left of the half cylinder's lift but 0.04 of its drag, still
-not the measured sign: it takes faces that look up to be pressed down, as plates were in that work. Undersides that slide
+(b), (c) Drag and lift against the depth of the rod's axis. (d) Lift over drag deep
+down, beside the sign that was measured (Ding, Gravish and Goldman, Phys. Rev. Lett.
+106, 028001 (2011)): up on round and square rods, down on a half cylinder that lies on
+its flat side. The nine-term map says up for all. It pulls on faces that look up by more
+than 53 degrees, and that lifts. Without tension (dashed, open) nothing is left of the
+half cylinder's lift but 0.04 of its drag, still not the measured sign: it takes faces
+that look up to be pressed down, as plates were in that work. Undersides that slide
 along themselves carry nothing here; they could only add lift.
 
 Sizes of the rods and depths are assumed; medium: 3 mm glass, as in the text.
@@ -33,23 +38,29 @@ from rft.terradynamics.plates import (
     parts,
 )
 
-RADIUS, WIDTH = 0.0127, 0.1  # m, assumed
+# m, assumed
+RADIUS = 0.0127
+WIDTH = 0.1
 RODS = {
     "round": (RoundRod(RADIUS, WIDTH), "up"),
     "half, flat down": (HalfCylinder(RADIUS, WIDTH, "down"), "down"),
     "half, flat up": (HalfCylinder(RADIUS, WIDTH, "up"), None),
     "square": (SquareRod(2 * RADIUS, WIDTH), "up"),
 }  # and the sign of the lift that was measured
-DEEPEST, DEEP = 0.15, 100.0  # m; at the second, one depth for all of a rod
+# m; at the second, one depth for all of a rod
+DEEPEST = 0.15
+DEEP = 100.0
 LEVEL = (1.0, 0.0, 0.0)
 
 
 def compute(medium: str = "glass-3mm", elements: int = 400, depths: int = 61) -> dict:
     """Return stresses around a cylinder, and drag and lift on the rods against depth.
 
-    "beta": (B,) radians. "normal", "tangent": (B,) by plates, N/cm^3. "cylinder": {"beta", "normal", "tangent"} of its
-    elements. "pulled": beta from which on the grains pull. "depth": (D,) of the axis, m. "rods": by name and tension
-    {"drag", "lift": (D,), N, "ratio": lift over drag deep down}. "measured": sign by name, 0 where it is not known.
+    "beta": (B,) radians. "normal", "tangent": (B,) by plates, N/cm^3. "cylinder":
+    {"beta", "normal", "tangent"} of its elements. "pulled": beta from which on the
+    grains pull. "depth": (D,) of the axis, m. "rods": by name and tension {"drag",
+    "lift": (D,), N, "ratio": lift over drag deep down}. "measured": sign by name, 0
+    where it is not known.
     """
     stress = VERTICAL[medium].stress
     beta = np.linspace(0.0, np.pi, 361)
@@ -58,7 +69,8 @@ def compute(medium: str = "glass-3mm", elements: int = 400, depths: int = 61) ->
     leads = (faces.depth > 0).ravel()
     around = np.mod(np.arctan2(faces.n[0].ravel(), -faces.n[1].ravel())[leads], np.pi)
     a_x, a_z = (a.ravel()[leads] for a in stress.alpha(faces.n, faces.v))
-    sin, cos = np.sin(around), np.cos(around)
+    sin = np.sin(around)
+    cos = np.cos(around)
     cylinder = {
         "beta": around,
         "normal": cos * a_z + sin * a_x,
@@ -74,9 +86,11 @@ def compute(medium: str = "glass-3mm", elements: int = 400, depths: int = 61) ->
 
 
 def on_face(stress, beta):
-    """Return normal and tangential stress per depth on plates that move level, N/cm^3."""
+    """Return normal and tangential stress per depth on plates that move level,
+    N/cm^3."""
     a_x, a_z = stress(beta, 0.0)
-    sin, cos = np.sin(beta), np.cos(beta)
+    sin = np.sin(beta)
+    cos = np.cos(beta)
     return sin * a_x + cos * a_z, sin * a_z - cos * a_x
 
 
@@ -86,7 +100,8 @@ def rod_forces(stress, outline, depths: int) -> dict:
     force = loads(
         stress, outline, np.stack([0 * depth, -depth, 0 * depth], -1), LEVEL
     ).force
-    drag, lift = -force[:, 0], force[:, 1]
+    drag = -force[:, 0]
+    lift = force[:, 1]
     return {"drag": drag[:-1], "lift": lift[:-1], "ratio": float(lift[-1] / drag[-1])}
 
 
@@ -131,7 +146,7 @@ def draw(numbers: dict):
     style.entry(axes[0, 1], "tension cut", ls="--")
     axes[0, 1].legend(loc="upper left")
     draw_ratios(axes[1, 1], numbers)
-    style.lettered(axes)
+    style.letter_panels(axes)
     return fig
 
 

@@ -1,15 +1,20 @@
-"""Fig. 8(b): forces on a c-leg, a flat leg and a reversed c-leg that turn through loose poppy seeds about a fixed hub.
+"""Fig. 8(b): forces on a c-leg, a flat leg and a reversed c-leg that turn through loose
+poppy seeds about a fixed hub.
 
-All three have the projected length 2 R with R = 3.8 cm, and turn at 2 pi rad/s; doubling that changes no force, in the text
-and here. Angle 0 is where a leg points straight down, and positive angles come later. The forces are not symmetric about it:
-a leg presses into the grains on its way down and is held back by them on its way up, where they are weaker. What the
-curvature does to this shows in `asymmetry`, the odd part of a force in the angle over its even part. The c-leg, its bulge
-ahead, meets the grains first, feels most lift and is pushed up until it has all but left; the flat leg and the reversed one
-are pulled down at the end, and the reversed one, its hollow ahead, has its peaks after straight down.
+All three have the projected length 2 R with R = 3.8 cm, and turn at 2 pi rad/s;
+doubling that changes no force, in the text and here. Angle 0 is where a leg points
+straight down, and positive angles come later. The forces are not symmetric about it: a
+leg presses into the grains on its way down and is held back by them on its way up,
+where they are weaker. What the curvature does to this shows in `asymmetry`, the odd
+part of a force in the angle over its even part. The c-leg, its bulge ahead, meets the
+grains first, feels most lift and is pushed up until it has all but left; the flat leg
+and the reversed one are pulled down at the end, and the reversed one, its hollow ahead,
+has its peaks after straight down.
 
-The height of the hub (2 cm) and the width of the legs (2.5 cm) are not in the text: assumed. The dotted lines are for hubs a
-centimetre lower and higher. Forces are in proportion to the width. The measured curves are not in the text, either; of them
-it says that the peaks for the c-leg are within 10 % of those of the theory.
+The height of the hub (2 cm) and the width of the legs (2.5 cm) are not in the text:
+assumed. The dotted lines are for hubs a centimetre lower and higher. Forces are in
+proportion to the width. The measured curves are not in the text, either; of them it
+says that the peaks for the c-leg are within 10 % of those of the theory.
 """
 
 from __future__ import annotations
@@ -29,8 +34,9 @@ HUBS = (-0.01, 0.0, 0.01)  # m, added to the scene's height
 def compute(legs=LEGS, hubs=HUBS, samples: int = 541) -> dict:
     """Return {"legs", "own": row of the scene's own height among ``hubs``}.
 
-    By leg: {"outline": (N, 2), m, "hub": its height, m, "angle": (T,), radians, "force": (H, T, 2), N, for hubs at the scene's
-    height plus ``hubs``}. The angles are symmetric about 0.
+    By leg: {"outline": (N, 2), m, "hub": its height, m, "angle": (T,), radians,
+    "force": (H, T, 2), N, for hubs at the scene's height plus ``hubs``}. The angles are
+    symmetric about 0.
     """
     found = {}
     for name in legs:
@@ -49,14 +55,18 @@ def compute(legs=LEGS, hubs=HUBS, samples: int = 541) -> dict:
 
 
 def asymmetry(angle, force) -> float:
-    """Return the norm of the odd part of a force over that of its even part, at angles (T,) symmetric about 0."""
-    even, odd = (force + force[::-1]) / 2, (force - force[::-1]) / 2
+    """Return the norm of the odd part of a force over that of its even part, at angles
+    (T,) symmetric about 0."""
+    even = (force + force[::-1]) / 2
+    odd = (force - force[::-1]) / 2
     return float(np.sqrt(np.trapezoid(odd**2, angle) / np.trapezoid(even**2, angle)))
 
 
 def peaks(numbers: dict, name: str) -> dict:
-    """Return, at the scene's height, {"peak", "least": N, "at": degrees, "asymmetry"} by component "x", "z"."""
-    leg, out = numbers["legs"][name], {}
+    """Return, at the scene's height, {"peak", "least": N, "at": degrees, "asymmetry"}
+    by component "x", "z"."""
+    leg = numbers["legs"][name]
+    out = {}
     for k, axis in enumerate("xz"):
         force = leg["force"][numbers["own"], :, k]
         at = float(np.degrees(leg["angle"][force.argmax()]))
@@ -134,9 +144,11 @@ def draw(numbers: dict):
 
 
 def draw_leg(ax, leg: dict, colour: str, marker: str) -> None:
-    """Draw poses at a few angles, the first the lightest; the marker at the tip is that of the leg's peaks."""
+    """Draw poses at a few angles, the first the lightest; the marker at the tip is that
+    of the leg's peaks."""
     for strength, degrees in zip((0.25, 0.5, 0.75, 1.0), DRAWN):
-        cos, sin = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+        cos = np.cos(np.radians(degrees))
+        sin = np.sin(np.radians(degrees))
         x, z = (leg["outline"] @ np.array([[cos, -sin], [sin, cos]])).T
         ax.plot(
             1e2 * x,

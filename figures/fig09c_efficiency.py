@@ -1,18 +1,24 @@
-"""Fig. 9(c): what a wave along the body achieves against its curvature: sandfish in loose and close glass, snake in loose.
+"""Fig. 9(c): what a wave along the body achieves against its curvature: sandfish in
+loose and close glass, snake in loose.
 
-Rows: progress per cycle over the arc length lambda_s of a wave; the same over its straight wavelength lambda; slip;
-mechanical cost of transport. Left against the mean relative curvature, right against A / lambda, which are one to one.
-Dots mark the best wave where there is one: efficiency and slip go on improving with the amplitude. Solid: the whole
-body, ends and yaw included. Dashed and dotted: the balance of force along an endless wave that slides along its curve,
-without and with the sandfish's head drag; dash-dot-dotted: one whose points move only sideways. Pale: the snake, its skin
-friction set against that of an aluminium rod, 0.2, in place of the 0.15 in the caption of Fig. 5. Last row: the sandfish's
-body velocity through a cycle of its own wave (dash-dotted above).
+Rows: progress per cycle over the arc length lambda_s of a wave; the same over its
+straight wavelength lambda; slip; mechanical cost of transport. Left against the mean
+relative curvature, right against A / lambda, which are one to one. Dots mark the best
+wave where there is one: efficiency and slip go on improving with the amplitude. Solid:
+the whole body, ends and yaw included. Dashed and dotted: the balance of force along an
+endless wave that slides along its curve, without and with the sandfish's head drag;
+dash-dot-dotted: one whose points move only sideways. Pale: the snake, its skin friction
+set against that of an aluminium rod, 0.2, in place of the 0.15 in the caption of Fig.
+5. Last row: the sandfish's body velocity through a cycle of its own wave (dash-dotted
+above).
 
-The paper defines undulation efficiency as progress "normalized by wavelength" and shows its optimum near the animal, A /
-lambda = 0.22. Its abscissa is curvature times lambda_s, the arc length of a wave, and read with that wavelength the
-efficiency of an endless wave in loose glass has its optimum at A / lambda = 0.21 (the whole sandfish's, with ends and yaw,
-is at 0.295, 0.343 in close glass). Read with the straight wavelength it has none: it grows with the amplitude. Maladen et
-al. (2011) found speed, not wave efficiency, largest near 0.2, and a wave efficiency of 0.5 for the animal; the whole
+The paper defines undulation efficiency as progress "normalized by wavelength" and shows
+its optimum near the animal, A / lambda = 0.22. Its abscissa is curvature times
+lambda_s, the arc length of a wave, and read with that wavelength the efficiency of an
+endless wave in loose glass has its optimum at A / lambda = 0.21 (the whole sandfish's,
+with ends and yaw, is at 0.295, 0.343 in close glass). Read with the straight wavelength
+it has none: it grows with the amplitude. Maladen et al. (2011) found speed, not wave
+efficiency, largest near 0.2, and a wave efficiency of 0.5 for the animal; the whole
 sandfish has 0.503 here.
 """
 
@@ -34,9 +40,11 @@ SCENES = {
     "sandfish-close": style.CLOSE,
     "shovel-nosed-snake": style.GREEN,
 }
-ROUGHER = "shovel-nosed-snake, rod 0.2"  # the snake, if the law's rod had that friction, not the 0.15 of Fig. 5
+# the snake, if the law's rod had that friction, not the 0.15 of Fig. 5
+ROUGHER = "shovel-nosed-snake, rod 0.2"
 COLOURS = {**SCENES, ROUGHER: "#8FD3B6"}
-ENDLESS = {  # how an endless wave is drawn: with the head's drag, kinematics, dashes, label
+# how an endless wave is drawn: with the head's drag, kinematics, dashes, label
+ENDLESS = {
     "endless": (False, "sliding", "--", "endless wave, sliding"),
     "endless_head": (True, "sliding", ":", "the same, head drag"),
     "endless_sideways": (
@@ -61,13 +69,15 @@ MEASURES = {  # what is best: the largest (1) or the least (-1)
 
 
 def compute(amplitudes=AMPLITUDES, finer: int = 3) -> dict:
-    """Return for each scene and ROUGHER, with ``finer`` times its elements, its `undulation.performance` over amplitudes
-    A / lambda (B,), and "best": {measure: (amplitude, value)} of progress and MEASURES that have an optimum among the
-    amplitudes. For the sandfish efficiencies (B,) of ENDLESS waves, "animal", its own A / lambda (the snake's is
-    assumed, and not marked), and "cycle" (N, 3), body velocity at that amplitude.
+    """Return for each scene and ROUGHER, with ``finer`` times its elements, its
+    `undulation.performance` over amplitudes A / lambda (B,), and "best": {measure:
+    (amplitude, value)} of progress and MEASURES that have an optimum among the
+    amplitudes. For the sandfish efficiencies (B,) of ENDLESS waves, "animal", its own A
+    / lambda (the snake's is assumed, and not marked), and "cycle" (N, 3), body velocity
+    at that amplitude.
 
-    finer: a snake's tight bends take some 120 elements a wave; with a third of them its efficiency seems to have an
-    optimum near A / lambda = 0.4, which is none.
+    finer: a snake's tight bends take some 120 elements a wave; with a third of them its
+    efficiency seems to have an optimum near A / lambda = 0.4, which is none.
     """
     out = {}
     for name in COLOURS:
@@ -105,7 +115,8 @@ def draw(numbers: dict):
     for row, key in zip(axes, MEASURES):
         for ax, against in zip(row, ("relative_curvature", "amplitude")):
             draw_measure(ax, numbers, key, against)
-            # A weak wave costs up to a hundred times its drag: cut off, to show the cheapest.
+            # A weak wave costs up to a hundred times its drag: cut off, to show the
+            # cheapest.
             ax.set_ylim(
                 0, 8 if key == "cost_of_transport" else 90 if key == "slip" else None
             )
@@ -142,7 +153,8 @@ def arc_efficiency(found: dict, endless: str) -> np.ndarray:
 def draw_measure(ax, numbers: dict, key: str, against: str):
     place = Sine().relative_curvature if against == "relative_curvature" else np.asarray
     for name, found in numbers.items():
-        x, colour = found[against], COLOURS[name]
+        x = found[against]
+        colour = COLOURS[name]
         convert = np.degrees if key == "slip" else np.asarray
         ax.plot(x, convert(found[key]), color=colour, label=name.replace("-", " "))
         if key in found["best"]:

@@ -1,22 +1,28 @@
-"""Fig. 10: muscle activation of a swimming sandfish, predicted by the internal moment that holds against the sand.
+"""Fig. 10: muscle activation of a swimming sandfish, predicted by the internal moment
+that holds against the sand.
 
-The sign of the moment is taken for the side that works, as in Sec. III C (`geomech.studies.undulation.activation`), for a
-plain body at the animal's amplitude in loose glass; dashed in (d), with the sandfish's head drag.
+The sign of the moment is taken for the side that works, as in Sec. III C
+(`geomech.studies.undulation.activation`), for a plain body at the animal's amplitude in
+loose glass; dashed in (d), with the sandfish's head drag.
 
-(a) As Fig. 10(c): lines where the right side starts and stops to work, over the shaded part of the cycle in which
-curvature to the left falls. (b) As Fig. 10(b): curvature and moment at one place. The caption's place is x = 0.71 pi,
-from an origin it does not name; ours is 70 % of the way from head to tail. There the right side starts before the body is
-bent most to the left. (c) Phase by which activation is ahead of curvature: pi / 2 where the side that works is the one
-that shortens, as at the middle of a body that is alike fore and aft; more towards the tail, the advance that Sec. III C
-speaks of. (d) Speed of the wave of activation over that of curvature.
+(a) As Fig. 10(c): lines where the right side starts and stops to work, over the shaded
+part of the cycle in which curvature to the left falls. (b) As Fig. 10(b): curvature and
+moment at one place. The caption's place is x = 0.71 pi, from an origin it does not
+name; ours is 70 % of the way from head to tail. There the right side starts before the
+body is bent most to the left. (c) Phase by which activation is ahead of curvature: pi /
+2 where the side that works is the one that shortens, as at the middle of a body that is
+alike fore and aft; more towards the tail, the advance that Sec. III C speaks of. (d)
+Speed of the wave of activation over that of curvature.
 
-The ratio is above 1: the wave of activation is the faster one, as Sec. III C says of nearly all undulating animals. The
-same section later calls its phase speed the smaller one, as an inverse of a slope; what is smaller here is the slope of
-the lines in (a), time over place, not its inverse. From 0.5 to 1.8 waves the ratio falls, but not evenly:
-between 1 and 1.4 waves it is level to 5 % by the lines of onset and offset, with a shallow dip, and rises by 10 % by the
-first harmonic. As the lines are not straight the ratio depends on the share of the body they are fitted over: from 0.2 to
-0.8 of it instead of 0.1 to 0.9 it is lower by up to 0.3, with the same dip. The comparison with electromyography needs
-the animals' data and is not made.
+The ratio is above 1: the wave of activation is the faster one, as Sec. III C says of
+nearly all undulating animals. The same section later calls its phase speed the smaller
+one, as an inverse of a slope; what is smaller here is the slope of the lines in (a),
+time over place, not its inverse. From 0.5 to 1.8 waves the ratio falls, but not evenly:
+between 1 and 1.4 waves it is level to 5 % by the lines of onset and offset, with a
+shallow dip, and rises by 10 % by the first harmonic. As the lines are not straight the
+ratio depends on the share of the body they are fitted over: from 0.2 to 0.8 of it
+instead of 0.1 to 0.9 it is lower by up to 0.3, with the same dip. The comparison with
+electromyography needs the animals' data and is not made.
 """
 
 from __future__ import annotations
@@ -37,11 +43,12 @@ PLACES = (0.25, 0.5, 0.75)  # of the table
 
 
 def compute(waves=WAVES, elements: int = 100, phases: int = 128) -> dict:
-    """Return the activation of a sandfish in loose glass at the scene's A / lambda, with ``waves`` (W,) on its body.
+    """Return the activation of a sandfish in loose glass at the scene's A / lambda,
+    with ``waves`` (W,) on its body.
 
-    Without head drag:
-    "waves": (W,). "s": (S,), tail 0 to head 1. "lag": (W, S), rad. "speed", "fundamental_speed": (W,), ratios by the lines
-    of onset and offset and by the first harmonic. "one": all of `undulation.activation` for one wave.
+    Without head drag: "waves": (W,). "s": (S,), tail 0 to head 1. "lag": (W, S), rad.
+    "speed", "fundamental_speed": (W,), ratios by the lines of onset and offset and by
+    the first harmonic. "one": all of `undulation.activation` for one wave.
     "head": {"lag", "speed", "fundamental_speed"}, the same with head drag.
     """
     fish = load("sandfish-loose").with_numerics(phases=phases)
@@ -80,7 +87,8 @@ def selected(numbers: dict) -> list[int]:
 
 
 def table(numbers: dict) -> str:
-    """Return speed ratios and the phase by which activation is ahead of curvature at three places."""
+    """Return speed ratios and the phase by which activation is ahead of curvature at
+    three places."""
     heads = (
         "waves",
         "speed ratio: lines",
@@ -106,12 +114,13 @@ def draw(numbers: dict):
     draw_trace(axes[0, 1], numbers["one"])
     draw_lag(axes[1, 0], numbers)
     draw_speed(axes[1, 1], numbers)
-    style.lettered(axes)
+    style.letter_panels(axes)
     return fig
 
 
 def draw_map(ax, one: dict):
-    s, t = one["s"], np.append(one["t"], 2 * np.pi)
+    s = one["s"]
+    t = np.append(one["t"], 2 * np.pi)
     rate = np.concatenate([one["bend_rate"], one["bend_rate"][:1]])
     ax.contourf(s, t, rate, levels=[-np.inf, 0.0], colors=[style.SHADED["color"]])
     for key, dashes in (("onset", "-"), ("offset", "--")):
@@ -134,8 +143,10 @@ def draw_map(ax, one: dict):
 
 
 def draw_trace(ax, one: dict):
-    """Draw curvature and moment over a cycle at PLACE, each over its largest value, and the span in which the right works."""
-    k, t = np.abs(one["s"] - PLACE).argmin(), np.append(one["t"], 2 * np.pi)
+    """Draw curvature and moment over a cycle at PLACE, each over its largest value, and
+    the span in which the right works."""
+    k = np.abs(one["s"] - PLACE).argmin()
+    t = np.append(one["t"], 2 * np.pi)
     looks = (
         ("bend", style.BLUE, 1.0, "curvature, + to the left"),
         ("moment", style.GREEN, 2.0, "moment, + left side works"),
@@ -176,7 +187,8 @@ def draw_lag(ax, numbers: dict):
 
 
 def draw_speed(ax, numbers: dict):
-    waves, head = numbers["waves"], numbers["head"]
+    waves = numbers["waves"]
+    head = numbers["head"]
     looks = (
         ("speed", "o", style.BLACK, "onset, offset"),
         ("fundamental_speed", "^", style.VERMILION, "first harmonic"),

@@ -1,4 +1,5 @@
-"""Fig. 11(c): the x row of the local connection of the three-link swimmer, with a circle gait."""
+"""Fig. 11(c): the x row of the local connection of the three-link swimmer, with a
+circle gait."""
 
 from __future__ import annotations
 

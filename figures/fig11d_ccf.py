@@ -1,4 +1,5 @@
-"""Fig. 11(d): the x component of the CCF of the three-link swimmer, with a circle and a butterfly gait."""
+"""Fig. 11(d): the x component of the CCF of the three-link swimmer, with a circle and a
+butterfly gait."""
 
 from __future__ import annotations
 
@@ -10,7 +11,8 @@ from geomech.studies.scene_tables import SceneTables
 
 
 def compute(scene: str = "three-link-glass", **numerics) -> dict:
-    """Return the CCF on its grid and its error (Fields with values (3, N, N)), and the gaits."""
+    """Return the CCF on its grid and its error (Fields with values (3, N, N)), and the
+    gaits."""
     loaded = load(scene).with_numerics(**numerics)
     study = SceneTables(loaded)
     return {
@@ -23,9 +25,8 @@ def compute(scene: str = "three-link-glass", **numerics) -> dict:
 @plots.styled
 def draw(numbers: dict):
     fig, axes = plots.figure(4.2, 3.4)
-    plots.ccf_map(
-        numbers["ccf"], 0, numbers["gaits"], ax=axes[0, 0], error=numbers["error"]
-    )
+    error = numbers["error"]
+    plots.ccf_map(numbers["ccf"], 0, numbers["gaits"], ax=axes[0, 0], error=error)
     return fig
 
 

@@ -1,5 +1,9 @@
-"""Fig. 11(e): displacement per cycle against stroke amplitude, circle and butterfly gaits, by every tier: the CCF of the
-uniform fit, the CCF adapted to the family of gaits, path integrals, and the force balance."""
+"""Fig. 11(e): displacement per cycle of circle and butterfly gaits against amplitude,
+by every tier.
+
+The tiers are the CCF of the uniform fit, the CCF adapted to the family of gaits, path
+integrals, and the force balance.
+"""
 
 from __future__ import annotations
 
@@ -21,17 +25,15 @@ AMPLITUDES = {
 
 def compute(scene: str = "three-link-glass", amplitudes: dict | None = None) -> dict:
     """Return the displacements of each gait, by amplitude and tier."""
-    loaded, amplitudes = load(scene), amplitudes or AMPLITUDES
-    study = SceneTables(loaded)
-    tables = {
-        name: study.displacements(a, [*TIERS], GAITS[name])
-        for name, a in amplitudes.items()
-    }
+    study = SceneTables(load(scene))
+    tables = {}
+    for name, values in (amplitudes or AMPLITUDES).items():
+        tables[name] = study.displacements(values, [*TIERS], GAITS[name])
     return {"tables": tables}
 
 
-def curves(axes, tables: dict) -> None:
-    """Draw the displacements of each gait on axes of its own, without a legend."""
+def draw_gaits(axes, tables: dict) -> None:
+    """Draw the displacements of each gait on its own axes, without a legend."""
     for ax, (name, table) in zip(axes, tables.items()):
         plots.displacement(table, ax=ax, errors=False, legend=False)
         ax.set_title(name)
@@ -40,7 +42,7 @@ def curves(axes, tables: dict) -> None:
 @plots.styled
 def draw(numbers: dict):
     fig, axes = plots.figure(7.2, 3.4, len(numbers["tables"]))
-    curves(axes[0], numbers["tables"])
+    draw_gaits(axes[0], numbers["tables"])
     plots.shared_legend(fig)
     return fig
 

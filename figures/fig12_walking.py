@@ -1,8 +1,10 @@
-"""Fig. 12(b), (d) and (f): forward speed of Xplorer against time, its mean speed against the curvature of its legs at 1 to
-4 Hz, and that of SandBot against the air flow through the grains at 2 to 8 rad/s.
+"""Fig. 12(b), (d) and (f): forward speed of Xplorer against time, its mean speed
+against the curvature of its legs at 1 to 4 Hz, and that of SandBot against the air flow
+through the grains at 2 to 8 rad/s.
 
-The paper gives mass and length of the robots and no other size: those are assumed (the built-in scenes say which), and so is
-the air speed of fluidisation. The trends are claimed, not the numbers; `figures.walking_sensitivity` shows what these hang on.
+The paper gives mass and length of the robots and no other size: those are assumed (the
+built-in scenes say which), and so is the air speed of fluidisation. The trends are
+claimed, not the numbers; `figures.walking_sensitivity` shows what these hang on.
 """
 
 from __future__ import annotations
@@ -26,8 +28,10 @@ AIR = np.linspace(0.0, 0.24, 9).tolist()  # m/s
 def compute(
     curvatures=CURVATURES, frequencies=FREQUENCIES, rates=RATES, air=AIR
 ) -> dict:
-    """Return the walk of Xplorer as it is built in, and legs and flow as `geomech.studies.sweep.sweep` gives them."""
-    xplorer, sandbot = load("xplorer"), load("sandbot")
+    """Return the walk of Xplorer as it is built in, and legs and flow as
+    `geomech.studies.sweep.sweep` gives them."""
+    xplorer = load("xplorer")
+    sandbot = load("sandbot")
     over = {"robot.legs.relative_curvature": curvatures, "gait.frequency": frequencies}
     flows = {
         "effects.aeration.air_speed": air,

@@ -1,4 +1,5 @@
-"""A strip of pictures: the butterfly gait in loose glass, on the ground and on the CCF map."""
+"""A strip of pictures: the butterfly gait in loose glass, on the ground and on the map
+of the CCF."""
 
 from __future__ import annotations
 

@@ -1,9 +1,10 @@
-"""The effect of the body frame on the area tier in loose glass: mean, middle-link and minimum-perturbation frame against the
-force balance.
+"""The effect of the body frame on the area tier in loose glass: mean, middle-link and
+minimum-perturbation frame against the force balance.
 
-Above: net distance per cycle, by the area under the CCF in each frame and by the force balance, which is the same in all.
-Below: how far the area tier is from the force balance in its own frame, and, dotted, the path tier, which integrates the same
-fitted connection along the gait: no frame removes its error.
+Above: net distance per cycle, by the area under the CCF in each frame and by the force
+balance, which is the same in all. Below: how far the area tier is from the force
+balance in its own frame, and, dotted, the path tier, which integrates the same fitted
+connection along the gait: no frame removes its error.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ GAITS = {
 
 
 def compute(scene: str = "three-link-glass", count: int = 20, grid: int = 31) -> dict:
-    """Return {gait: {"amplitude": (B,), frame: {tier: (B, 3)}}} of net poses, body lengths and rad, each in its own frame.
+    """Return {gait: {"amplitude": (B,), frame: {tier: (B, 3)}}} of net poses, body
+    lengths and rad, each in its own frame.
 
     The field reaches as far as the gaits.
     """
@@ -44,7 +46,8 @@ def compute(scene: str = "three-link-glass", count: int = 20, grid: int = 31) ->
 
 
 def missed(poses: dict, tier: str) -> np.ndarray:
-    """Return the distances (B,) of a tier's positions from those of the force balance."""
+    """Return the distances (B,) of a tier's positions from those of the force
+    balance."""
     return np.hypot(*(poses[tier] - poses["direct"])[:, :2].T)
 
 
@@ -61,7 +64,8 @@ def draw(numbers: dict):
             label="force balance",
         )
         for k, frame in enumerate(FRAMES, 1):
-            poses, look = numbers[name][frame], style.sparse(k, len(a))
+            poses = numbers[name][frame]
+            look = style.sparse(k, len(a))
             above.plot(
                 a,
                 np.hypot(*poses["area"][:, :2].T),

@@ -1,16 +1,21 @@
-"""What beds of grains say about resistive force theory: swimmers, lift on bars, and drag after a reversal.
+"""What beds of grains say about resistive force theory: swimmers, lift on bars, and
+drag after a reversal.
 
-Spheres of 6 mm with friction 0.3 and 1 MPa, in beds that differ by their seeds; error bars are standard errors over beds.
+Spheres of 6 mm with friction 0.3 and 1 MPa, in beds that differ by their seeds; error
+bars are standard errors over beds.
 
-(a) Displacement of three links, 162 x 12 mm at 25 mm depth, on circles, beside the tiers with the law of its flank and its
-ends, both measured in the same grains (band: one standard deviation of the flank's law): with ends whose axial force falls
-with the angle as on rods, with flat ends, and with a transient over two travels. (b) The same for the butterfly and a wave on
-seven links. (c) Lift over drag on bars without ends, beside the nine-term map, as it is and without tension. (d) Drag on the
-flank of a rod after its second reversal over that after a long way, in grains (dots) and by the law of the effect `transient`
-(lines), fitted at 20 mm alone: 10 and 40 mm are predicted.
+(a) Displacement of three links, 162 x 12 mm at 25 mm depth, on circles, beside the
+tiers with the law of its flank and its ends, both measured in the same grains (band:
+one standard deviation of the flank's law): with ends whose axial force falls with the
+angle as on rods, with flat ends, and with a transient over two travels. (b) The same
+for the butterfly and a wave on seven links. (c) Lift over drag on bars without ends,
+beside the nine-term map, as it is and without tension. (d) Drag on the flank of a rod
+after its second reversal over that after a long way, in grains (dots) and by the law of
+the effect `transient` (lines), fitted at 20 mm alone: 10 and 40 mm are predicted.
 
-Size, depth and friction of the robot of Fig. 11(e) are not in the paper's text, so that this is no copy of it. The data are
-in `figures/campaigns`; the commands that made them stand in the files.
+Size, depth and friction of the robot of Fig. 11(e) are not in the paper's text, so that
+this is no copy of it. The data are in `figures/campaigns`; the commands that made them
+stand in the files.
 """
 
 from __future__ import annotations
@@ -30,10 +35,13 @@ from rft import EndCaps, Transient
 from rft.grains.reversal import Recovery, recovery
 from rft.terradynamics.plates import VERTICAL, HalfCylinder, RoundRod
 
-RADIUS, SIZE = 6e-3, 0.162  # m, of the swimmer
+# m, of the swimmer
+RADIUS = 6e-3
+SIZE = 0.162
 AMPLITUDES = np.linspace(0.25, 2.1, 14)
 TIERS = "area", "harmonic", "direct"
-# Travels of the transient, body lengths: as the flank's drag comes back in these swims, and as on a rod to and fro.
+# Travels of the transient, body lengths: as the flank's drag comes back in these swims,
+# and as on a rod to and fro.
 TRAVELS = 0.05, 0.21
 OTHERS = (
     (grains.BUTTERFLY, 1.0),
@@ -41,7 +49,9 @@ OTHERS = (
     (grains.WAVE, 0.87),
     (grains.WAVE, 1.2),
 )
-FLAT, FLAT_ENDS = "direct, flat ends", 1.71  # e of both, fitted to the same rods
+# e of both, fitted to the same rods
+FLAT = "direct, flat ends"
+FLAT_ENDS = 1.71
 BARS = {  # by their names in the data
     "round": RoundRod(grains.BAR, 0.1),
     "half round": HalfCylinder(grains.BAR, 0.1, "down"),
@@ -52,14 +62,17 @@ BARS = {  # by their names in the data
 def compute(amplitudes=AMPLITUDES, others=OTHERS, travels=TRAVELS) -> dict:
     """Return predicted and measured numbers.
 
-    "amplitude": (A,), rad. "curves": by name {"distance", "spread": (A,), BL} of circles, spread only of the law. "others":
-    by scene and amplitude, by name distances and spread (float, float). "swims": by scene, amplitude, rad, and frequency,
-    Hz, (distance, error), BL. "lift": by shape {"grains", "error", "keep", "cut"}, lift over drag. "reversal": by (depth,
-    m, angle from the axis, degrees) and "flank" or "ends" {"plateau", "at_once", "travel", "start", "rms": (mean, error)}
-    of `rft.grains.reversal.Recovery`, by all amplitudes together. "stretches": by (amplitude, m, depth, m, angle) (mean,
-    error) of the share of the flank's late drag that is there at once after the second reversal, and of the travel, m, to
-    95 % of it. "ways": by (amplitude, m, angle) {"travel" since the second reversal, m, "grains", "law"}, shares of the
-    plateau, 24.5 mm deep."""
+    "amplitude": (A,), rad. "curves": by name {"distance", "spread": (A,), BL} of
+    circles, spread only of the law. "others": by scene and amplitude, by name distances
+    and spread (float, float). "swims": by scene, amplitude, rad, and frequency, Hz,
+    (distance, error), BL. "lift": by shape {"grains", "error", "keep", "cut"}, lift
+    over drag. "reversal": by (depth, m, angle from the axis, degrees) and "flank" or
+    "ends" {"plateau", "at_once", "travel", "start", "rms": (mean, error)} of
+    `rft.grains.reversal.Recovery`, by all amplitudes together. "stretches": by
+    (amplitude, m, depth, m, angle) (mean, error) of the share of the flank's late drag
+    that is there at once after the second reversal, and of the travel, m, to 95 % of
+    it. "ways": by (amplitude, m, angle) {"travel" since the second reversal, m,
+    "grains", "law"}, shares of the plateau, 24.5 mm deep."""
     found = {case: predicted(case[0], [case[1]], travels) for case in others}
     return {
         "amplitude": np.asarray(amplitudes),
@@ -80,8 +93,10 @@ def compute(amplitudes=AMPLITUDES, others=OTHERS, travels=TRAVELS) -> dict:
 
 
 def predicted(scene_name: str, amplitudes, travels=TRAVELS) -> dict:
-    """Return distances by tier, with flat ends and with transients, and their spread by the medium, body lengths."""
-    law, scene = rod_fit("flank-drag", end_caps="fitted"), load(scene_name)
+    """Return distances by tier, with flat ends and with transients, and their spread by
+    the medium, body lengths."""
+    law = rod_fit("flank-drag", end_caps="fitted")
+    scene = load(scene_name)
     caps = law.caps(RADIUS / SIZE)
     medium = replace(law.medium, covariance=None)
     study = lambda medium, tiers, *effects: SceneTables(
@@ -108,7 +123,8 @@ def predicted(scene_name: str, amplitudes, travels=TRAVELS) -> dict:
 
 
 def over_beds(values: np.ndarray, beds: np.ndarray) -> tuple[float, float]:
-    """Return the mean over beds of their means, and its standard error; nan of one bed."""
+    """Return the mean over beds of their means, and its standard error; nan of one
+    bed."""
     means = np.array([values[beds == bed].mean() for bed in np.unique(beds)])
     return float(means.mean()), float(means.std(ddof=1) / np.sqrt(len(means))) if len(
         means
@@ -133,7 +149,8 @@ def measured_swims() -> dict[tuple[str, float, float], tuple[float, float]]:
 
 
 def lifts(name: str, bar) -> dict:
-    """Return lift over drag of a bar in grains and by the nine-term map, as it is and without tension, deep down."""
+    """Return lift over drag of a bar in grains and by the nine-term map, as it is and
+    without tension, deep down."""
     data = grains.read("lift")
     mine = data["shape"] == name
     value, error = over_beds(data["lift_over_drag"][mine], data["bed"][mine])
@@ -148,7 +165,8 @@ def lifts(name: str, bar) -> dict:
 def reversal_cases(
     depth: float, angle: float, part: str, beds=grains.BEDS, amplitudes=None
 ) -> list[tuple]:
-    """Return (amplitude, travel, drag) of all ways at a depth, m, and an angle, degrees; means over beds."""
+    """Return (amplitude, travel, drag) of all ways at a depth, m, and an angle,
+    degrees; means over beds."""
     data = grains.read("reversals")
     mine = (data["depth_m"] == depth) & (data["angle_deg"] == angle)
     found = []
@@ -182,8 +200,8 @@ def measured_reversals() -> dict:
 
 
 def measured_stretches() -> dict:
-    """Return what fits to each bed alone say, drag = late (1 - (1 - share) exp(-travel / length)), with the mean of the last 40
-    % of the stretch as the late drag."""
+    """Return what fits to each bed alone say, drag = late (1 - (1 - share) exp(-travel
+    / length)), with the mean of the last 40 % of the stretch as the late drag."""
     from scipy.optimize import curve_fit
 
     found = {}
@@ -191,7 +209,8 @@ def measured_stretches() -> dict:
         fits = []
         for bed in grains.BEDS:
             ((_, way, drag),) = reversal_cases(depth, angle, "flank", (bed,), (a,))
-            x, drag = (way - 3 * a)[way > 3 * a], drag[way > 3 * a]
+            x = (way - 3 * a)[way > 3 * a]
+            drag = drag[way > 3 * a]
             share = lambda x, at_once, length: 1 - (1 - at_once) * np.exp(-x / length)
             late = drag[x > 0.6 * 2 * a].mean()
             bounds = [-1, x[1] - x[0]], [1, 4 * a]  # nothing faster than a bin is seen
@@ -207,7 +226,8 @@ def measured_stretches() -> dict:
 
 
 def ways(depth: float = 0.0245, fitted: float = 0.02) -> dict:
-    """Return drags after the second reversal, and the law fitted at one amplitude, m, alone."""
+    """Return drags after the second reversal, and the law fitted at one amplitude, m,
+    alone."""
     found = {}
     for angle in (90.0, 0.0):
         law = recovery(reversal_cases(depth, angle, "flank", amplitudes=(fitted,)))
@@ -235,7 +255,8 @@ def named_swim(case: tuple[str, float, float]) -> str:
 
 
 def by_curves(numbers: dict, case: tuple[str, float, float]) -> dict[str, float]:
-    """Return what the curves say of a swim, body lengths; nothing of one that is not predicted."""
+    """Return what the curves say of a swim, body lengths; nothing of one that is not
+    predicted."""
     scene, amplitude, _ = case
     if scene == grains.CIRCLE:
         at = numbers["amplitude"]
@@ -250,7 +271,8 @@ def by_curves(numbers: dict, case: tuple[str, float, float]) -> dict[str, float]
 
 
 def table(numbers: dict) -> str:
-    """Return the measured displacements beside the curves, lift over drag, and drag after reversals."""
+    """Return the measured displacements beside the curves, lift over drag, and drag
+    after reversals."""
     rows = []
     for case, (d, e) in numbers["swims"].items():
         curves = by_curves(numbers, case)
@@ -303,7 +325,7 @@ def table(numbers: dict) -> str:
 def draw(numbers: dict):
     fig, axes = plots.figure(9.0, 6.4, 2, 2)
     (left, right), (lift_axes, reversal_axes) = axes
-    style.lettered(axes)
+    style.letter_panels(axes)
     draw_circles(left, numbers)
     draw_others(right, numbers)
     draw_lift(lift_axes, numbers["lift"])
@@ -324,7 +346,8 @@ DOTS = {
 def looks(curves) -> dict[str, dict]:
     """Return colour, line and marker of every curve, by its name."""
     colours = (style.PINK, style.BLUE, style.VERMILION, "0.5", style.GREEN, style.GREEN)
-    lines, markers = ("-", ":", "-", "-", "--", ":"), "^Dsvx+"
+    lines = ("-", ":", "-", "-", "--", ":")
+    markers = "^Dsvx+"
     shape = {"mfc": "white", "ms": 4.5}
     return {
         name: {
@@ -341,12 +364,11 @@ def looks(curves) -> dict[str, dict]:
 def draw_circles(ax, numbers: dict) -> None:
     """Draw displacements of circles against the amplitude."""
     for name, look in looks(numbers["curves"]).items():
-        x, curve = numbers["amplitude"], numbers["curves"][name]
+        x = numbers["amplitude"]
+        curve = numbers["curves"][name]
         if name == "direct":
-            low, high = (
-                curve["distance"] - curve["spread"],
-                curve["distance"] + curve["spread"],
-            )
+            low = curve["distance"] - curve["spread"]
+            high = curve["distance"] + curve["spread"]
             ax.fill_between(x, low, high, color=look["color"], alpha=0.2, lw=0)
         ax.plot(x, curve["distance"], **look, label=name)
     for frequency, face in ((1.0, "black"), (0.5, "white")):
@@ -416,10 +438,8 @@ def draw_reversals(ax, ways: dict) -> None:
     for (a, angle), way in ways.items():
         if angle or a == 0.02:
             colour = style.SEQUENCE[(0.01, 0.02, 0.04).index(a)] if angle else "0.5"
-            x, label = (
-                1e3 * way["travel"],
-                f"{1e3 * a:g} mm {'across' if angle else 'along'}",
-            )
+            x = 1e3 * way["travel"]
+            label = f"{1e3 * a:g} mm {'across' if angle else 'along'}"
             ax.plot(x, way["grains"], ".", ms=3, color=colour)
             ax.plot(x, way["law"], color=colour, label=label)
     ax.set(

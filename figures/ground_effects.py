@@ -1,9 +1,12 @@
-"""The effects of grains and ground on the force on the c-leg of Fig. 8(b) in loose poppy seeds.
+"""Grains and ground: their effects on the force on the c-leg of Fig. 8(b) in loose poppy
+seeds.
 
-Left: the force that the inertia of grains adds, rms over the turn, over the rms force without it, against the rate, for
-lambda of 1 to 4; it is seen above some 230 rpm (dashed). Middle: peak lift over that in still, level ground against air
-speed over that of fluidisation, and against slope over the angle of repose, where the leg sweeps down the slope and where it
-sweeps up. Right: lift against angle with an earlier intrusion before the leg.
+Left: the force that the inertia of grains adds over the force without it, both rms over
+the turn, against the rate, for lambda of 1 to 4; experiments notice it above some 230 rpm
+(dashed). Middle: peak lift over its value in still, level ground, against air speed over
+the speed of fluidisation, and against slope over the angle of repose, for a leg that
+sweeps down the slope and one that sweeps up. Right: lift against angle where an earlier
+intrusion has disturbed the ground before the leg.
 """
 
 from __future__ import annotations
@@ -18,7 +21,7 @@ from geomech.scenes import load
 from rft.terradynamics.ground import Aeration, DisturbedGround, GrainInertia, Slope
 from rft.terradynamics.ground.slope import REPOSE
 
-SEEN = 230.0  # rpm
+NOTICED_RATE = 230.0  # rpm
 SHARE = 0.1  # of the force, from which an effect counts as seen; assumed
 PLACES = (-0.04, 0.0, 0.04)  # m
 
@@ -28,38 +31,41 @@ def compute(
     strengths=(1.0, 2.0, 4.0),
     shares=(0, 0.2, 0.4, 0.6, 0.8),
 ) -> dict:
-    """Return rates (R,), rpm; added (S, R); at (S,): the rate at which SHARE is added. shares (N,), aerated, rising and
-    falling (N,): peaks of the lift over that without, on ground that rises or falls ahead of the robot by shares of
-    REPOSE. angle (T,), rad; lift {place: (T,)}, N."""
+    """Return rates (R,), rpm; added (S, R); at (S,): the rate at which SHARE is added.
+    shares (N,), aerated, rising and falling (N,): peaks of the lift over that without,
+    on ground that rises or falls ahead of the robot by shares of REPOSE. angle (T,),
+    rad; lift {place: (T,)}, N."""
     leg = load("c-leg")
     without = leg.run()
-    size = np.sqrt((without.force**2).sum(-1).mean())
-    added = (
-        np.array([[_added(leg, without, k, rpm) for rpm in rates] for k in strengths])
-        / size
-    )
-    peak = lambda effect: (
-        leg.changed(effects=(effect,)).run().force[:, 1].max()
-        / without.force[:, 1].max()
-    )
-    ground = lambda x: DisturbedGround(places=(x,), radius=0.02, weakening=0.5)
+    added = [[added_force(leg, without, k, rpm) for rpm in rates] for k in strengths]
+    added = np.array(added) / np.sqrt((without.force**2).sum(-1).mean())
+
+    def lift(effect) -> np.ndarray:
+        return leg.changed(effects=(effect,)).run().force[:, 1]
+
+    def peaks(effects) -> np.ndarray:
+        highest = [lift(effect).max() for effect in effects]
+        return np.array(highest) / without.force[:, 1].max()
+
+    lifts = {None: without.force[:, 1]}
+    for x in PLACES:
+        lifts[x] = lift(DisturbedGround(places=(x,), radius=0.02, weakening=0.5))
     return {
         "rates": np.array(rates),
         "strengths": strengths,
         "added": added,
-        "at": rates[-1]
-        * np.sqrt(SHARE / added[:, -1]),  # it grows with the square of the rate
+        # The force grows with the square of the rate.
+        "at": rates[-1] * np.sqrt(SHARE / added[:, -1]),
         "shares": np.array(shares),
-        "aerated": np.array([peak(Aeration(x * 0.03, 0.03)) for x in shares]),
-        "rising": np.array([peak(Slope(x * REPOSE)) for x in shares]),
-        "falling": np.array([peak(Slope(-x * REPOSE)) for x in shares]),
+        "aerated": peaks(Aeration(x * 0.03, 0.03) for x in shares),
+        "rising": peaks(Slope(x * REPOSE) for x in shares),
+        "falling": peaks(Slope(-x * REPOSE) for x in shares),
         "angle": without.pose[:, 2],
-        "lift": {None: without.force[:, 1]}
-        | {x: leg.changed(effects=(ground(x),)).run().force[:, 1] for x in PLACES},
+        "lift": lifts,
     }
 
 
-def _added(leg, without, strength: float, rpm: float) -> float:
+def added_force(leg, without, strength: float, rpm: float) -> float:
     """Return the rms over the turn of the force that the inertia of grains adds, N."""
     fast = dataclasses.replace(leg.motion, rate=rpm * 2 * np.pi / 60)
     found = leg.changed(motion=fast, effects=(GrainInertia(strength),)).run()
@@ -67,16 +73,22 @@ def _added(leg, without, strength: float, rpm: float) -> float:
 
 
 def table(numbers: dict) -> str:
-    """Return the rates from which on the inertia of grains is seen."""
-    at_seen = numbers["added"][:, list(numbers["rates"]).index(SEEN)]
-    return "\n".join(
-        f"lambda = {k:g}: {100 * share:.0f} % of the force at {SEEN:.0f} rpm, {100 * SHARE:.0f} % at {at:.0f} rpm"
-        for k, at, share in zip(numbers["strengths"], numbers["at"], at_seen)
-    )
+    """Return the rates above which the inertia of grains is noticeable."""
+    column = list(numbers["rates"]).index(NOTICED_RATE)
+    lines = []
+    for k, strength in enumerate(numbers["strengths"]):
+        percent = 100 * numbers["added"][k, column]
+        rate = numbers["at"][k]
+        lines.append(
+            f"lambda = {strength:g}: {percent:.0f} % of the force at"
+            f" {NOTICED_RATE:.0f} rpm, {100 * SHARE:.0f} % at {rate:.0f} rpm"
+        )
+    return "\n".join(lines)
 
 
 @plots.styled
 def draw(numbers: dict):
+    """Draw the inertia of grains, aerated and sloped ground, and disturbed ground."""
     fig, axes = plots.figure(10.2, 3.2, 3)
     left, middle, right = axes[0]
     strengths = numbers["strengths"]
@@ -91,7 +103,7 @@ def draw(numbers: dict):
             color=shade,
             label=rf"$\lambda$ = {strength:g}",
         )
-    left.axvline(SEEN, **style.GUIDE, ls="--")
+    left.axvline(NOTICED_RATE, **style.GUIDE, ls="--")
     left.axhline(SHARE, **style.GUIDE)
     left.set(
         xlabel="rate of turning (rpm)", ylabel="added by grain inertia / force without"

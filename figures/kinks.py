@@ -1,7 +1,9 @@
-"""The errors of the linear connection and of its odd harmonics near kinks of the velocity: maps over shape space.
+"""Errors near kinks of the velocity: those of the linear connection and of its odd
+harmonics, as maps over shape space.
 
-Left: the fraction of directions of alphadot for which some link stands still. Middle and right: the residual of the turning
-rate, rms over directions, by the first harmonic (the connection) and by all odd harmonics up to the 15th.
+Left: the fraction of directions of alphadot for which some link stands still. Middle
+and right: the residual of the turning rate, rms over directions, by the first harmonic
+(the connection) and by all odd harmonics up to the 15th.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
-"""A measured gait: a log of sixty noisy cycles of a three-link swimmer in a viscous fluid, the connection near its mean gait by
-regression, and the displacement that this predicts (Bittner, Hatton and Revzen, Nonlinear Dynamics 94, 1933 (2018)).
+"""A measured gait: sixty noisy cycles of a three-link swimmer in a viscous fluid, the
+connection near their mean by regression, and the displacement that it predicts.
 
-The log is made from the swimmer's own velocity, so that the truth is known: joints deviate by 0.05 rad from the gait, each
-row has noise of 1e-3 rad and 1e-3 BL.
+The method is that of Bittner, Hatton and Revzen, Nonlinear Dynamics 94, 1933 (2018).
+The log is computed from the swimmer's velocity, so that the truth is known: joints
+deviate by 0.05 rad from the gait, and each row has noise of 1e-3 rad and 1e-3 BL.
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ def draw(numbers: Result):
 
 
 def table(numbers: Result) -> str:
-    """Return displacements and the share of the velocity that the connection explains."""
+    """Return displacements and the fraction of the velocity that the connection
+    explains."""
     return show.text(numbers)
 
 

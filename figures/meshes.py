@@ -1,8 +1,10 @@
 """Bodies of three dimensions by the law of Agarwal, Goldman and Kamrin (2023).
 
-Top: stress on meshes where the force is largest, as `geomech intrude` draws it. Bottom: error of the force on a sphere and a
-cylinder against the number of triangles, deep and half out of the ground; the law in the vertical plane (psi = 0) beside the
-generic map of two dimensions, both over their stress on a plate pushed straight down, for plates of all tilts.
+Top: stress on meshes where the force is largest, as `geomech intrude` draws it. Bottom:
+error of the force on a sphere and a cylinder against the number of triangles, deep and
+half out of the ground; the law in the vertical plane (psi = 0) beside the generic map
+of two dimensions, both over their stress on a plate pushed straight down, for plates of
+all tilts.
 """
 
 from __future__ import annotations
@@ -23,10 +25,12 @@ STEP = 4  # degrees
 
 
 def compute(ladder=(80, 320, 1280, 5120, 20480, 327680)) -> dict:
-    """Return the faces of the pictures, errors of forces, and the laws of two and three dimensions.
+    """Return the faces of the pictures, errors of forces, and the laws of two and three
+    dimensions.
 
-    pictures: {scene: (faces, above)}. errors: {(body, depth): (triangles, error, order)}. angles: (2, B, G), beta and gamma,
-    rad. two, three: (2, B, G), alpha_x against the motion and alpha_z upwards over that straight down.
+    pictures: {scene: (faces, above)}. errors: {(body, depth): (triangles, error,
+    order)}. angles: (2, B, G), beta and gamma, rad. two, three: (2, B, G), alpha_x
+    against the motion and alpha_z upwards over that straight down.
     """
     pictures = {}
     for name in SCENES:
@@ -55,8 +59,10 @@ def compute(ladder=(80, 320, 1280, 5120, 20480, 327680)) -> dict:
 
 
 def _errors(body: str, depth: float, ladder):
-    """Return triangles, errors and order of the force on a body that is dragged aside and down while it turns."""
-    medium, meshes = Spatial(3e5, 0.3), [BODIES[body].mesh(n) for n in ladder]
+    """Return triangles, errors and order of the force on a body that is dragged aside
+    and down while it turns."""
+    medium = Spatial(3e5, 0.3)
+    meshes = [BODIES[body].mesh(n) for n in ladder]
     forces = [
         wrench(
             medium, m, np.eye(3), [0, 0, -depth], [0.03, 0.05, -0.1], [2.0, -1.0, 3.0]

@@ -1,7 +1,10 @@
-"""Midlines of a whole trial: an undulator in loose glass beads with 30 points of 1 % noise, its kinematics with intervals,
-and what the balance of forces gives to its shapes in close beads.
+"""Midlines of a trial: the kinematics of an undulator in glass beads with intervals,
+and the speed that the balance of forces predicts for its shapes.
 
-The trial is computed in loose beads, so that the truth is known: the wave's swing and its number vary by 5 %, its pace by 2 %.
+The trial is computed in loose beads, so that the truth is known: 30 points with 1 % of
+noise, a swing and a number of waves that vary by 5 %, and a frequency that varies by 2
+%.
+The prediction is for close beads.
 """
 
 from __future__ import annotations
@@ -22,7 +25,8 @@ from rft import Backbone
 def compute(
     medium: str = "glass-0.3mm-close", cycles: float = 8.4, seed: int = 1
 ) -> Result:
-    """Return the kinematics of a synthetic trial in loose beads, with the prediction of a medium."""
+    """Return the kinematics of a synthetic trial in loose beads, with the prediction
+    for a medium."""
     swimmer = Swimmer(MEDIA["glass-0.3mm-loose"], Backbone(40))
     trial = synthetic_midlines(swimmer, cycles, seed=seed).trial("trial.csv")
     fit = fit_midlines(trial)

@@ -1,15 +1,19 @@
-"""Optimal gaits of the three-link swimmer in a viscous fluid and in loose glass: for displacement, and for efficiency.
+"""Optimal gaits of the three-link swimmer in a viscous fluid and in loose glass: for
+displacement, and for efficiency.
 
-Sand's optima are larger and bring more. Two things differ. Drag in sand does not grow with speed: a link that creeps holds
-as firmly as one that sweeps, so that wide strokes pay, in which one end sweeps while the rest is an anchor, and a fast
-sweep costs no more work than a slow one. With drag like |v|^p and the fluid's ratio of drag across to drag along, 2, the
-stroke for displacement reaches 1.9 rad and 0.10 BL at p = 1, and the limit of 2.5 rad and 0.23 BL at p = 0.3 and 0.37 BL at
-p = 0; that for efficiency 1.44 rad, and the limit at both. And at small slip sand's drag across is 1 + C / tan gamma0 =
-8.3 times that along. That alone adds to what a stroke brings and draws the loop in: a fluid of that ratio has 0.40 BL at 1.76
-rad.
+Sand's optima are larger and bring more. Two things differ. Drag in sand does not grow
+with speed: a link that creeps holds as firmly as one that sweeps, so that wide strokes
+pay, in which one end sweeps while the rest is an anchor, and a fast sweep costs no more
+work than a slow one. With drag like |v|^p and the fluid's ratio of drag across to drag
+along, 2, the stroke for displacement reaches 1.9 rad and 0.10 BL at p = 1, and the
+limit of 2.5 rad and 0.23 BL at p = 0.3 and 0.37 BL at p = 0; that for efficiency 1.44
+rad, and the limit at both. And at small slip sand's drag across is 1 + C / tan gamma0 =
+8.3 times that along. That alone adds to what a stroke brings and draws the loop in: a
+fluid of that ratio has 0.40 BL at 1.76 rad.
 
-In the fluid the stroke for displacement follows the zero line of the CCF, and that for efficiency cuts the far ends off,
-where little area is left for much path. In sand the CCF is that of a least-squares connection, which is not all.
+In the fluid the stroke for displacement follows the zero line of the CCF, and that for
+efficiency cuts the far ends off, where little area is left for much path. In sand the
+CCF is that of a least-squares connection, which is not all.
 """
 
 from __future__ import annotations
@@ -30,7 +34,8 @@ OBJECTIVES = {"displacement": (style.BLACK, "-"), "efficiency": (style.GREEN, "-
 
 
 def compute(harmonics: int = 5, starts: int | None = None, **numerics) -> dict:
-    """Return, by medium, the optimum for each of OBJECTIVES, and "ccf", the CCF whose area they gain."""
+    """Return, by medium, the optimum for each of OBJECTIVES, and "ccf", the CCF whose
+    area they gain."""
     out = {}
     for medium, name in SCENES.items():
         scene = load(name).with_numerics(**numerics)

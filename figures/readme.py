@@ -14,9 +14,9 @@ def compute() -> dict:
 @plots.styled
 def draw(numbers: dict):
     fig, axes = plots.figure(10.8, 3.0, 3, width_ratios=[1.15, 1.0, 1.0])
-    field, study = numbers["map"], numbers["tables"]
-    plots.ccf_map(field["ccf"], 0, field["gaits"], ax=axes[0, 0], error=field["error"])
-    fig11e_displacement.curves(axes[0, 1:], study["tables"])
+    ccf = numbers["map"]
+    plots.ccf_map(ccf["ccf"], 0, ccf["gaits"], ax=axes[0, 0], error=ccf["error"])
+    fig11e_displacement.draw_gaits(axes[0, 1:], numbers["tables"]["tables"])
     plots.shared_legend(fig, "outside right center")
     return fig
 

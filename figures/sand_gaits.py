@@ -1,7 +1,9 @@
-"""A gait for sand: a hexapod in MuJoCo learns to walk in loose poppy seeds and on a hard floor, and each gait is tried on both.
+"""A gait for sand: a hexapod in MuJoCo learns to walk in loose poppy seeds and on a
+hard floor, and each gait is tried on both.
 
-A search by the cross-entropy method over frequency, duty, sweep and middle angle of a tripod's clock, a few hundred walks
-of three seconds on each ground, all in `mujoco.batch.Batch` (MuJoCo 4). All sizes are assumed.
+A search by the cross-entropy method over frequency, duty, sweep and middle angle of a
+tripod's clock, a few hundred walks of three seconds on each ground, all in
+`mujoco.batch.Batch` (MuJoCo 4). All sizes are assumed.
 """
 
 from __future__ import annotations
@@ -14,10 +16,9 @@ from rft.terradynamics.walking import Tripod
 
 PHASES = 0.5 * np.array([0, 1, 1, 0, 0, 1])  # of the legs, cycles: a tripod
 MEDIUM = "poppy-seeds-loose"
-LOW, HIGH = (
-    np.array([1.0, 0.3, 0.6, -0.6]),
-    np.array([4.0, 0.8, 2.4, 0.6]),
-)  # Hz, -, rad, rad: of the clock
+# Hz, -, rad, rad: of the clock
+LOW = np.array([1.0, 0.3, 0.6, -0.6])
+HIGH = np.array([4.0, 0.8, 2.4, 0.6])
 SNAPSHOTS = 6  # of one cycle
 
 
@@ -36,7 +37,8 @@ def controls(clock: np.ndarray, seconds: float, step: float) -> np.ndarray:
 def walk(
     batch, clock: np.ndarray, seconds: float, step: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return speeds (n,), m/s, over the last two thirds of walks, 0 for those that end upside down, and positions."""
+    """Return speeds (n,), m/s, over the last two thirds of walks, 0 for those that end
+    upside down, and positions."""
     batch.reset()
     angles = controls(clock, seconds, step)
     path = batch.rollout(angles.shape[1], control=angles)["qpos"]
@@ -51,27 +53,31 @@ def walk(
 def search(
     batch, generations: int, seconds: float, step: float, seed: int = 0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the best clock (4,) and the best speed of each generation, by the cross-entropy method."""
-    rng, n = np.random.default_rng(seed), batch.nsim
-    mean, deviation, best, speeds = (LOW + HIGH) / 2, (HIGH - LOW) / 4, None, []
+    """Return the best clock (4,) and the best speed of each generation, by the
+    cross-entropy method."""
+    rng = np.random.default_rng(seed)
+    n = batch.nsim
+    mean = (LOW + HIGH) / 2
+    deviation = (HIGH - LOW) / 4
+    best = None
+    speeds = []
     for _ in range(generations):
         clock = np.clip(mean + deviation * rng.standard_normal((n, 4)), LOW, HIGH)
         if best is not None:
             clock[0] = best
         speed, _ = walk(batch, clock, seconds, step)
         elite = clock[np.argsort(-speed)[: max(2, n // 5)]]
-        mean, deviation, best = (
-            elite.mean(0),
-            elite.std(0) + 0.02 * (HIGH - LOW),
-            elite[0],
-        )
+        mean = elite.mean(0)
+        deviation = elite.std(0) + 0.02 * (HIGH - LOW)
+        best = elite[0]
         speeds.append(float(speed.max()))
     return best, np.array(speeds)
 
 
 def compute(generations: int = 8, walks: int = 32, seconds: float = 3.0) -> dict:
-    """Return "clocks": {ground: (4,)}, "found": {ground: best speed by generation}, "speeds": (2, 2), m/s, of the gaits for
-    sand and floor (rows) in sand and on the floor (columns), and "strip", a cycle of the gait for sand in it."""
+    """Return "clocks": {ground: (4,)}, "found": {ground: best speed by generation},
+    "speeds": (2, 2), m/s, of the gaits for sand and floor (rows) in sand and on the
+    floor (columns), and "strip", a cycle of the gait for sand in it."""
     import warnings
 
     import mujoco
@@ -80,7 +86,8 @@ def compute(generations: int = 8, walks: int = 32, seconds: float = 3.0) -> dict
     from rft.mujoco import attach
     from rft.mujoco.example import hexapod
 
-    hard, soft = hexapod(), hexapod()
+    hard = hexapod()
+    soft = hexapod()
     step = float(soft.opt.timestep)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the legs touch the floor no more
@@ -99,7 +106,8 @@ def compute(generations: int = 8, walks: int = 32, seconds: float = 3.0) -> dict
         tried = {
             name: walk(batch, both, seconds, step) for name, batch in batches.items()
         }
-    path, data = tried["sand"][1][0], mujoco.MjData(soft)
+    path = tried["sand"][1][0]
+    data = mujoco.MjData(soft)
     cycle = round(1 / (clocks["sand"][0] * step))
     shapes = []
     for k in np.linspace(len(path) - cycle - 1, len(path) - 1, SNAPSHOTS).astype(int):
@@ -116,8 +124,10 @@ def compute(generations: int = 8, walks: int = 32, seconds: float = 3.0) -> dict
 
 
 def _outline(robot, data) -> tuple[np.ndarray, np.ndarray]:
-    """Return the trunk's corners (4, 2) and the legs' ends (6, 2, 2) as seen from the side, x and z, m."""
-    turn, place = data.geom_xmat[1].reshape(3, 3), data.geom_xpos[1]
+    """Return the trunk's corners (4, 2) and the legs' ends (6, 2, 2) as seen from the
+    side, x and z, m."""
+    turn = data.geom_xmat[1].reshape(3, 3)
+    place = data.geom_xpos[1]
     half = robot.geom_size[1]
     corners = (
         place

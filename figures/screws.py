@@ -1,4 +1,5 @@
-"""Screws in sand by the law of three dimensions: what one pulls against slip, and how craft on two of them go.
+"""Screws in sand by the law of three dimensions: what one pulls against slip, and how
+craft on two of them go.
 
 The craft is that of the built-in scene ``screws``; it and its sand are assumed. Lines
 are the balance in the mean over a turn, without inertia
@@ -37,54 +38,62 @@ def compute(
 ) -> dict:
     """Return what a screw pulls, how far craft advance a turn, and their paths.
 
-    slip, pulled {height: Turning}; pitch, advance {mass: (P,)}, m a turn; found (T,): MuJoCo's at the pitches ``tried`` with
-    the scene's mass; paths {(pair, mass): (time, x, y, Cruise)}, s and m.
+    slip, pulled {height: Turning}; pitch, advance {mass: (P,)}, m a turn; found (T,):
+    MuJoCo's at the pitches ``tried`` with the scene's mass; paths {(pair, mass):
+    (time, x, y, Cruise)}, s and m.
     """
-    scene, slip = load("screws"), np.linspace(-0.2, 1.0, slips)
+    scene = load("screws")
+    slip = np.linspace(-0.2, 1.0, slips)
     fineness = fineness or scene.numerics
     triangles = PER_SQUARE * fineness.elements**2
-    of = lambda mass, pitch: dataclasses.replace(
-        scene.robot,
-        mass=mass,
-        screw=dataclasses.replace(scene.robot.screw, pitch=pitch),
-    )
-    walk = lambda robot: engine("mujoco").walk(
-        [Walker(robot, scene.gait, scene.medium)], fineness
-    )[0]
-    pulled = {
-        h: turning(scene.medium, scene.robot.screw, h, slip, triangles=triangles)
-        for h in HEIGHTS
-    }
-    going = lambda robot: cruise(scene.medium, robot, scene.gait.frequency, triangles)
-    advance = {
-        mass: np.array([going(of(mass, p)).advance for p in pitches]) for mass in MASSES
-    }
-    found = np.array(
-        [walk(of(scene.robot.mass, p)).speed / scene.gait.frequency for p in tried]
-    )
+    frequency = scene.gait.frequency
+
+    def robot(mass: float, pitch: float):
+        screw = dataclasses.replace(scene.robot.screw, pitch=pitch)
+        return dataclasses.replace(scene.robot, mass=mass, screw=screw)
+
+    def walk(robot):
+        walker = Walker(robot, scene.gait, scene.medium)
+        return engine("mujoco").walk([walker], fineness)[0]
+
+    def balance(robot):
+        return cruise(scene.medium, robot, frequency, triangles)
+
+    pulled = {}
+    for height in HEIGHTS:
+        screw = scene.robot.screw
+        pulled[height] = turning(scene.medium, screw, height, slip, triangles=triangles)
+    advance = {}
+    for mass in MASSES:
+        advances = [balance(robot(mass, pitch)).advance for pitch in pitches]
+        advance[mass] = np.array(advances)
+    speeds = [walk(robot(scene.robot.mass, pitch)).speed for pitch in tried]
     paths = {}
     for (pair, mass), turns in PATHS.items():
-        robot = dataclasses.replace(scene.robot, pair=pair, mass=mass)
-        one = walk(robot)
-        within = one.t * scene.gait.frequency <= turns + 1e-9
+        craft = dataclasses.replace(scene.robot, pair=pair, mass=mass)
+        path = walk(craft)
+        shown = path.t * frequency <= turns + 1e-9
         paths[pair, mass] = (
-            turns / scene.gait.frequency,
-            one.pose[within, 0],
-            one.spatial["y"][within],
-            going(robot),
+            turns / frequency,
+            path.pose[shown, 0],
+            path.spatial["y"][shown],
+            balance(craft),
         )
     return {
-        "slip": slip, "pulled": pulled, "pitch": np.array(pitches), "advance": advance, "tried": np.array(tried),
-        "found": found, "paths": paths,
-    }  # fmt: skip
+        "slip": slip,
+        "pulled": pulled,
+        "pitch": np.array(pitches),
+        "advance": advance,
+        "tried": np.array(tried),
+        "found": np.array([speed / frequency for speed in speeds]),
+        "paths": paths,
+    }
 
 
 def table(numbers: dict) -> str:
     """Return what MuJoCo finds beside the balance."""
-    lines, by_balance = (
-        [],
-        np.interp(numbers["tried"], numbers["pitch"], numbers["advance"][1.0]),
-    )
+    lines = []
+    by_balance = np.interp(numbers["tried"], numbers["pitch"], numbers["advance"][1.0])
     for p, found, expected in zip(numbers["tried"], numbers["found"], by_balance):
         lines.append(
             f"pitch {p:g} m: advance {found:.4g} m a turn by MuJoCo, {expected:.4g} by the balance"
@@ -103,7 +112,7 @@ def draw(numbers: dict):
         numbers["pulled"].items(), style.shades(len(numbers["pulled"]))
     ):
         thrust.plot(
-            numbers["slip"], pulled.thrust, color=colour, label=described(height)
+            numbers["slip"], pulled.thrust, color=colour, label=height_text(height)
         )
         torque.plot(numbers["slip"], 1e3 * pulled.torque, color=colour)
     style.zero_line(thrust)
@@ -148,13 +157,12 @@ def draw(numbers: dict):
     return fig
 
 
-def described(height: float) -> str:
-    """Return the height of an axis over the surface in words."""
-    return (
-        f"{abs(1e3 * height):.0f} mm {'above' if height > 0 else 'below'}"
-        if height
-        else "at the surface"
-    )
+def height_text(height: float) -> str:
+    """Return the height of an axis over the surface, m, in words."""
+    if height == 0:
+        return "at the surface"
+    side = "above" if height > 0 else "below"
+    return f"{abs(1e3 * height):.0f} mm {side}"
 
 
 if __name__ == "__main__":

@@ -1,10 +1,11 @@
 """The loss of a sandfish by the transient response of the ground (paper Sec. IV A).
 
-Resistive force theory takes the drag for steady at once. After a reversal the grains need some travel, by the paper about a
-fifth of the amplitude of an oscillating rod, and the theory exceeds discrete-element simulation by up to 30 %. Left: net
-displacement over that without the effect, against the travel across over the wave's amplitude A, with the shares of the drag
-that are there at once in beds of grains (`figures.grains`); there the travel is 2.8 diameters of a rod. Right: forward
-velocity through a cycle.
+Resistive force theory takes the drag for steady at once. After a reversal the grains
+need some travel, by the paper about a fifth of the amplitude of an oscillating rod, and
+the theory exceeds discrete-element simulation by up to 30 %. Left: net displacement
+over that without the effect, against the travel across over the wave's amplitude A,
+with the shares of the drag that are there at once in beds of grains (`figures.grains`);
+there the travel is 2.8 diameters of a rod. Right: forward velocity through a cycle.
 """
 
 from __future__ import annotations
@@ -33,8 +34,9 @@ SHARES = (0.0, 0.1, 0.2, 0.4, 0.6, 0.9, 1.3, 1.7, GRAINS / 0.16)
 def compute(shares=SHARES, elements: int = 40, phases: int = 64) -> dict:
     """Return displacements and velocities for each travel.
 
-    shares: (T,), travel over A. net: (amplitudes, T), displacement over that at share 0. t: (N,), phase. velocity: (T, N),
-    xi_x at the animal's amplitude, body lengths per rad.
+    shares: (T,), travel over A. net: (amplitudes, T), displacement over that at share
+    0. t: (N,), phase. velocity: (T, N), xi_x at the animal's amplitude, body lengths
+    per rad.
     """
     fish = load("sandfish-loose")
     scenes = [

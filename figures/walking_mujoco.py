@@ -1,7 +1,9 @@
-"""The engine of three dimensions: its errors by steps and elements, and its speeds against the planar engine's. Needs MuJoCo.
+"""The engine of three dimensions: its errors by steps and elements, and its speeds
+against the planar engine's. Needs MuJoCo.
 
-Xplorer's progress in a stride of its limit cycle at 2 Hz, against the time steps of a cycle, of which each is 16 of MuJoCo's,
-and against the elements of a leg. The speeds of the planar engine are those of 96 steps and 48 elements.
+Xplorer's progress in a stride of its limit cycle at 2 Hz, against the time steps of a
+cycle, of which each is 16 of MuJoCo's, and against the elements of a leg. The speeds of
+the planar engine are those of 96 steps and 48 elements.
 """
 
 from __future__ import annotations
@@ -43,8 +45,8 @@ def stride_length(start, **numerics) -> float:
 
 
 def compute(study=STUDY, finest=FINEST, frequencies=FREQUENCIES, fine=FINE) -> dict:
-    """Return {"errors": {setting: (values, error of the way over it)}, "speeds": {robot: (frequencies, planar, MuJoCo)}}, Hz,
-    m/s."""
+    """Return {"errors": {setting: (values, error of the way over it)}, "speeds":
+    {robot: (frequencies, planar, MuJoCo)}}, Hz, m/s."""
     start = _simulation().walk(MOST_STRIDES).limit
     errors = {}
     for name, values in study.items():

@@ -1,9 +1,11 @@
-"""The sensitivity of the speeds of walking robots: every size that the paper does not give, one at a time, times 0.7 and
-1.4, and two choices of the model: whether grains pull on faces, as their map has it, and whether the belly is a closed box,
-whose bottom and front feel grains where they lead, or an open sheet, its bottom alone, which feels them on either side.
+"""The sensitivity of the speeds of walking robots: every size that the paper does not
+give, one at a time, times 0.7 and 1.4, and two choices of the model: whether grains
+pull on faces, as their map has it, and whether the belly is a closed box, whose bottom
+and front feel grains where they lead, or an open sheet, its bottom alone, which feels
+them on either side.
 
-Above, the mean speed of Xplorer with c-legs, flat and reversed ones at 2 Hz; below, that of SandBot at 4 rad/s in still grains
-and with air at 0.6 of fluidisation.
+Above, the mean speed of Xplorer with c-legs, flat and reversed ones at 2 Hz; below,
+that of SandBot at 4 rad/s in still grains and with air at 0.6 of fluidisation.
 """
 
 from __future__ import annotations
@@ -37,12 +39,14 @@ class Sheet(Rhex):
     """A robot whose belly is an open sheet, the bottom of the box."""
 
     def belly(self, elements: int) -> Outline:
-        x, z = self.length / 2, -self.height / 2
+        x = self.length / 2
+        z = -self.height / 2
         return Polygon(((-x, z), (x, z)), self.width, closed=False).outline(elements)
 
 
 def varied(scene, name: str, factor: float | str):
-    """Return the scene with one of its assumed sizes times a factor, or with another choice."""
+    """Return the scene with one of its assumed sizes times a factor, or with another
+    choice."""
     if name == "belly":
         return (
             scene
@@ -55,7 +59,8 @@ def varied(scene, name: str, factor: float | str):
 
 
 def changed(part, name: str, factor: float | str):
-    """Return a dataclass with a field, or a field of a field, times a factor, or replaced by a choice."""
+    """Return a dataclass with a field, or a field of a field, times a factor, or
+    replaced by a choice."""
     first, _, rest = name.partition(".")
     value = getattr(part, first)
     if rest:
@@ -72,8 +77,10 @@ def changed(part, name: str, factor: float | str):
 
 
 def compute(factors=FACTORS, names=NAMES) -> dict:
-    """Return {robot: {curve: {name: [(factor or choice, speed, estimate, status)]}}}."""
-    xplorer, sandbot = load("xplorer"), load("sandbot")
+    """Return {robot: {curve: {name: [(factor or choice, speed, estimate,
+    status)]}}}."""
+    xplorer = load("xplorer")
+    sandbot = load("sandbot")
     legs = lambda c: dataclasses.replace(xplorer.robot.legs, relative_curvature=c)
     curves = {
         "Xplorer": {
@@ -110,7 +117,8 @@ def compute(factors=FACTORS, names=NAMES) -> dict:
 
 
 def table(numbers: dict) -> str:
-    """Return by how many per cent each assumption moves each speed: the smaller size and the larger, or the other choice."""
+    """Return by how many per cent each assumption moves each speed: the smaller size
+    and the larger, or the other choice."""
     curves = [found for by_curve in numbers.values() for found in by_curve.values()]
     rows = [
         "| assumed | "

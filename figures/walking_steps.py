@@ -1,8 +1,10 @@
-"""The step-size study of the planar engine: Xplorer's progress from rest at 1 and 3 Hz by implicit and by explicit steps.
+"""The step-size study of the planar engine: Xplorer's progress from rest at 1 and 3 Hz
+by implicit and by explicit steps.
 
-The law of stress jumps at rest like dry friction and is rounded at a named speed. Explicit steps (Heun's, of order 2 as well)
-chatter across the jump until they resolve the rounding; implicit ones need not. Below, the residual of the balance of
-energy: work of the motors - loss in the ground - change of the body's energy.
+The law of stress jumps at rest like dry friction and is rounded at a named speed.
+Explicit steps (Heun's, of order 2 as well) chatter across the jump until they resolve
+the rounding; implicit ones need not. Below, the residual of the balance of energy: work
+of the motors - loss in the ground - change of the body's energy.
 """
 
 from __future__ import annotations
@@ -41,7 +43,8 @@ def heun(robots, state: State, phase: float, of: float, dt: float) -> State:
 
 
 def progress(frequency: float, steps: int, how: str, cycles: float = 1.5):
-    """Return the progress, m, and the residual of the balance of energy over the work, after some cycles from rest."""
+    """Return the progress, m, and the residual of the balance of energy over the work,
+    after some cycles from rest."""
     scene = load("xplorer")
     robots = _strides(
         [Walker(scene.robot, Tripod(frequency), scene.medium)], scene.numerics
@@ -49,7 +52,8 @@ def progress(frequency: float, steps: int, how: str, cycles: float = 1.5):
     state = first = robots.start()
     count = round(cycles * steps)
     for k in range(count):
-        phase, dt = k / steps, 1 / (steps * frequency)
+        phase = k / steps
+        dt = 1 / (steps * frequency)
         if how == "implicit":
             state = step(robots, state, phase, phase + 0.5 / steps, dt)
         else:
@@ -61,7 +65,8 @@ def progress(frequency: float, steps: int, how: str, cycles: float = 1.5):
 
 
 def compute(steps=STEPS, finest: int = FINEST, frequencies=FREQUENCIES) -> dict:
-    """Return {frequency: {how: (steps, error of the progress over it, residual of the energy's balance)}}."""
+    """Return {frequency: {how: (steps, error of the progress over it, residual of the
+    energy's balance)}}."""
     out = {}
     for f in frequencies:
         truth = progress(f, finest, "implicit")[0]

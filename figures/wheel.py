@@ -1,7 +1,9 @@
-"""A wheel on sand: drawbar pull and sinkage against slip, slow and fast, with and without the inertia of grains (Sec. IV C).
+"""A wheel on sand: drawbar pull and sinkage against slip, slow and fast, with and
+without the inertia of grains (Sec. IV C).
 
-Without inertia the law does not know how fast the wheel turns. A wheel of 0.1 m under 20 N in loose poppy seeds, all sizes
-assumed; lambda = 1 (1 to 4 are known) and 638 kg/m^3 (Agarwal et al. 2021).
+Without inertia the law does not depend on how fast the wheel turns. A wheel of 0.1 m
+under 20 N in loose poppy seeds, all sizes assumed; lambda = 1 (published values are 1
+to 4) and 638 kg/m^3 (Agarwal et al. 2021).
 """
 
 from __future__ import annotations
@@ -19,32 +21,35 @@ WHEELS = {"smooth": Wheel(0.1, 0.1), "12 lugs": Wheel(0.1, 0.1, 12, 0.015, 0.006
 
 
 def compute(slips: int = 23, load: float = 20.0, strength: float = 1.0) -> dict:
-    """Return slip (N,), the load, and "found": for each wheel {rate, or 0 without inertia: Rolling}."""
-    slip, stress = np.linspace(-0.2, 0.9, slips), VERTICAL["poppy-seeds-loose"].stress
+    """Return slip (N,), the load, N, and "found": for each wheel {rate: Rolling}, with
+    the rate 0 for the law without inertia."""
+    slip = np.linspace(-0.2, 0.9, slips)
+    stress = VERTICAL["poppy-seeds-loose"].stress
     inertia = [GrainInertia(strength)]
-    found = {
-        name: {0.0: rolling(stress, wheel, load, 1.0, slip)}
-        | {rate: rolling(stress, wheel, load, rate, slip, inertia) for rate in RATES}
-        for name, wheel in WHEELS.items()
-    }
+    found = {}
+    for name, wheel in WHEELS.items():
+        found[name] = {0.0: rolling(stress, wheel, load, 1.0, slip)}
+        for rate in RATES:
+            found[name][rate] = rolling(stress, wheel, load, rate, slip, inertia)
     return {"slip": slip, "load": load, "found": found}
 
 
 @plots.styled
 def draw(numbers: dict):
+    """Draw a column for each wheel: pull above, sinkage below."""
     fig, axes = plots.figure(7.4, 5.0, 2, 2)
-    for column, (name, lines) in zip(axes.T, numbers["found"].items()):
-        for (rate, found), colour in zip(
-            lines.items(), (style.BLACK, *style.shades(len(RATES)))
-        ):
-            label = "no inertia, any rate" if rate == 0 else f"{rate:g} rad/s"
-            look = {"color": colour, "lw": 2.0 if rate == 0 else 1.0, "label": label}
-            column[0].plot(numbers["slip"], found.pull / numbers["load"], **look)
-            column[1].plot(numbers["slip"], 1e3 * found.sinkage, **look)
-        style.zero_line(column[0])
-        column[0].set(title=name, ylabel="drawbar pull / load")
-        column[1].set(xlabel="slip", ylabel="sinkage (mm)")
-        column[1].invert_yaxis()
+    colours = (style.BLACK, *style.shades(len(RATES)))
+    for (pull_ax, sinkage_ax), (name, lines) in zip(axes.T, numbers["found"].items()):
+        for (rate, line), colour in zip(lines.items(), colours):
+            look = {"color": colour, "lw": 1.0, "label": f"{rate:g} rad/s"}
+            if rate == 0:
+                look |= {"lw": 2.0, "label": "no inertia, any rate"}
+            pull_ax.plot(numbers["slip"], line.pull / numbers["load"], **look)
+            sinkage_ax.plot(numbers["slip"], 1e3 * line.sinkage, **look)
+        style.zero_line(pull_ax)
+        pull_ax.set(title=name, ylabel="drawbar pull / load")
+        sinkage_ax.set(xlabel="slip", ylabel="sinkage (mm)")
+        sinkage_ax.invert_yaxis()
     fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside right center")
     return fig
 

@@ -1,4 +1,5 @@
-"""The cost of accuracy: error against time for every tier and setting of the built-in scene."""
+"""The cost of accuracy: error against time for every tier and setting of the built-in
+scene."""
 
 from __future__ import annotations
 
@@ -8,7 +9,7 @@ from geomech.core.variables import Result
 
 
 def compute(scene: str = "three-link-glass", runs: int = 2) -> Result:
-    """Return errors and times of every setting, as `geomech accuracy` gives them."""
+    """Return errors and times of every setting (`geomech accuracy`)."""
     return geomech.accuracy(scene, runs=runs)
 
 

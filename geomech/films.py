@@ -24,25 +24,27 @@ from geomech.run.progress import progress as progress_bar
 from geomech.studies import walking
 from rft.core.refusal import Refusal
 
-RATE, SLOW_RATE = 25, 10  # frames a second; of cycles that take long
-LONG = 4.0  # s: the longest cycle at RATE
-CYCLE = 2.0  # s that a cycle takes without a frequency
-# s that a cycle takes: ten pictures to see it by, and patience
-SHORTEST, LONGEST = 0.4, 10.0
+RATE = 25  # frames per second
+SLOW_RATE = 10  # frames per second, of long cycles
+LONG_CYCLE = 4.0  # s of film: the longest cycle at RATE
+CYCLE = 2.0  # s of film that a cycle takes without a frequency
+SHORTEST = 0.4  # s of film of a cycle: ten pictures, of which one can see it
+LONGEST = 10.0  # s of film of a cycle, assumed bearable
 STEPS = (1.0, 2.0, 5.0)  # of speeds, times a power of ten
 SLACK = 1 + 1e-9  # factor by which a time may miss a limit by rounding
-DOTS = 100  # an inch
-DRAWING = 0.012  # s a frame takes, some two times what it took
-FRAME = 4e5  # bytes a frame holds until the film is written
-MOST = 100  # pictures of the film of a walk
-WIDE, TALL = 6.4, (1.8, 3.6)  # in, of the film of a walk, and the limits of its height
-LABELS = 0.95  # in, of these, for the labels
+DPI = 100
+SECONDS_PER_FRAME = 0.012  # to draw one: twice the measured time
+BYTES_PER_FRAME = 4e5  # held until the film is written
+WALK_PICTURES = 100  # of the film of a walk, at most
+WALK_WIDTH = 6.4  # in, of the film of a walk
+WALK_HEIGHTS = (1.8, 3.6)  # in, lowest and highest
+LABELS = 0.95  # in, of width and height, for the labels
 
 Frames = Iterator[np.ndarray]  # pictures (height, width, 3), bytes
 
 
 def check_format(path: Path) -> None:
-    """Refuse a film that nothing here can write."""
+    """Refuse a film in a format that needs a program which is not installed."""
     if path.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
         raise Refusal(
             f"cannot write {path}",
@@ -55,8 +57,10 @@ def check_format(path: Path) -> None:
 
 
 class Pace(NamedTuple):
-    """Speed of a film. cycle: s of film that a cycle takes. rate: frames a second.
-    caption: tells the speed."""
+    """The speed of a film.
+
+    cycle: s of film that a cycle takes. rate: frames per second. caption: states the
+    speed."""
 
     cycle: float
     rate: int
@@ -64,15 +68,16 @@ class Pace(NamedTuple):
 
 
 def pace(frequency: float | None) -> Pace:
-    """Return the speed of a film of a gait: real time where a cycle then takes from
-    `SHORTEST` to `LONGEST`, else the nearest round multiple of it; `CYCLE` for a gait
-    without a frequency (Hz)."""
+    """Return the speed of a film of a gait.
+
+    It is real time where a cycle then takes from `SHORTEST` to `LONGEST`, else the
+    nearest round multiple of it. frequency: Hz; without one a cycle takes `CYCLE`."""
     if not frequency:
         return Pace(CYCLE, RATE, f"1 cycle = {CYCLE:g} s")
     speed = speed_of(1 / frequency)
     cycle = 1 / frequency / speed
     rate = RATE
-    if cycle > LONG:
+    if cycle > LONG_CYCLE:
         rate = SLOW_RATE
     caption = "real time"
     if speed != 1.0:
@@ -80,50 +85,56 @@ def pace(frequency: float | None) -> Pace:
     return Pace(cycle, rate, caption)
 
 
-def speed_of(takes: float) -> float:
-    """Return the speed of a film of cycles that take so long, s: 1, or the nearest of 2,
-    5, 10 ... or 0.5, 0.2, 0.1 ... with which they are seen."""
-    if SHORTEST <= takes <= LONGEST:
+def speed_of(period: float) -> float:
+    """Return the speed of a film of cycles of a period, s, as a multiple of real time.
+
+    It is 1, or the nearest of 2, 5, 10 ... or of 0.5, 0.2, 0.1 ... with which a cycle
+    takes from `SHORTEST` to `LONGEST`."""
+    if SHORTEST <= period <= LONGEST:
         return 1.0
     speeds = np.outer(10.0 ** np.arange(-12, 13), STEPS).ravel()
-    if takes > LONGEST:
-        return float(speeds[takes / speeds <= LONGEST * SLACK].min())
-    return float(speeds[takes / speeds >= SHORTEST / SLACK].max())
+    if period > LONGEST:
+        return float(speeds[period / speeds <= LONGEST * SLACK].min())
+    return float(speeds[period / speeds >= SHORTEST / SLACK].max())
 
 
 def rows(phases: int, cycles: int, frequency: float | None = None) -> np.ndarray:
-    """Return the row of a motion that each picture shows: a cycle's end is the next one's
-    start, and the last end is left out."""
-    at = pace(frequency)
-    count = max(1, round(cycles * at.cycle * at.rate))
-    places = np.arange(count) * phases / (at.cycle * at.rate)
+    """Return the row of a motion that each picture shows.
+
+    The end of a cycle is the start of the next one; the last end is not shown."""
+    speed = pace(frequency)
+    pictures_per_cycle = speed.cycle * speed.rate
+    count = max(1, round(cycles * pictures_per_cycle))
+    places = np.arange(count) * phases / pictures_per_cycle
     return np.minimum(places, phases * cycles - 1).astype(int)
 
 
 def cost(phases: int, cycles: int, frequency: float | None = None) -> Cost:
     """Return the cost of drawing a film."""
     frames = len(rows(phases, cycles, frequency))
-    return Cost(0, DRAWING * frames, FRAME * frames, DRAWING * frames)
+    seconds = SECONDS_PER_FRAME * frames
+    return Cost(0, seconds, BYTES_PER_FRAME * frames, seconds)
 
 
 # Motions
 
 
 def write_motion(path: Path, result: Result) -> None:
-    """Write the film of a motion, with its shapes on the CCF if the result has that; whole
-    or not at all."""
+    """Write the film of a motion, with its shapes on the CCF if the result has one. The
+    file appears whole or not at all."""
     scene = scene_of(result)
-    phases, cycles = scene.numerics.phases, result.attributes["cycles"]
+    cycles = result.attributes["cycles"]
     frequency = result.attributes.get("frequency")
-    at, shown = pace(frequency), rows(phases, cycles, frequency)
-    pictures = motion_frames(result, shown, at.caption)
+    speed = pace(frequency)
+    picture_rows = rows(scene.numerics.phases, cycles, frequency)
+    pictures = motion_frames(result, picture_rows, speed.caption)
     with progress_bar(f"film of {scene.name}") as progress:
-        write(path, counted(pictures, len(shown), progress), at.rate)
+        write(path, counted(pictures, len(picture_rows), progress), speed.rate)
 
 
 def motion_frames(result: Result, rows: np.ndarray, caption: str) -> Frames:
-    """Yield the pictures of a motion. Artists that stand still are drawn once."""
-    canvas, update, background = set_up(result, rows, caption)
+    """Yield the pictures of a motion. Artists that do not move are drawn once."""
+    canvas, update, background = motion_canvas(result, rows, caption)
     for row in rows:
         canvas.restore_region(background)
         for artist in update(row):
@@ -132,12 +143,12 @@ def motion_frames(result: Result, rows: np.ndarray, caption: str) -> Frames:
 
 
 @plots.styled
-def set_up(result: Result, rows: np.ndarray, caption: str) -> Any:
+def motion_canvas(result: Result, rows: np.ndarray, caption: str) -> Any:
     """Return (canvas, function that moves the artists to a row, background)."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     fig, update = plots.stage(result, rows, caption)
-    fig.set_dpi(DOTS)
+    fig.set_dpi(DPI)
     canvas = FigureCanvasAgg(fig)
     moving = update(rows[0])
     fig.get_layout_engine().execute(fig)  # with the longest text in place
@@ -152,28 +163,30 @@ def set_up(result: Result, rows: np.ndarray, caption: str) -> Any:
 
 
 def write_walk(path: Path, result: Result, follow: bool = False) -> None:
-    """Write the film of a walk; whole or not at all. follow: the camera goes with the
-    robot."""
-    at = pace(scene_of(result).gait.frequency)
-    write(path, walk_frames(result, at, follow), at.rate)
+    """Write the film of a walk. The file appears whole or not at all. follow: the
+    camera moves with the robot."""
+    speed = pace(scene_of(result).gait.frequency)
+    write(path, walk_frames(result, speed, follow), speed.rate)
 
 
-def walk_frames(result: Result, at: Pace, follow: bool) -> Frames:
-    """Return the pictures of a walk at the rate of its film: by MuJoCo for a walk of three
-    dimensions where there is a GL to draw with."""
-    t, frequency = result["t"].values, float(result["frequency"])
-    speed = 1 / (frequency * at.cycle)
-    count = min(MOST, 1 + int(t[-1] / speed * at.rate))
-    rows = rows_at(t, np.arange(count) * speed / at.rate)
+def walk_frames(result: Result, speed: Pace, follow: bool) -> Frames:
+    """Return the pictures of a walk at the rate of its film.
+
+    MuJoCo draws a walk in three dimensions where there is a GL to draw with."""
+    t = result["t"].values
+    frequency = float(result["frequency"])
+    multiple = 1 / (frequency * speed.cycle)  # of real time
+    count = min(WALK_PICTURES, 1 + int(t[-1] / multiple * speed.rate))
+    rows = rows_at(t, np.arange(count) * multiple / speed.rate)
     if "states" in result:
         states = result["states"].values[rows]
         pictures = walking.view(scene_of(result)).pictures(states)
         if pictures:
-            return captioned(pictures, t[rows], at.caption)
-    return drawn_frames(result, rows, at.caption, follow)
+            return with_captions(pictures, t[rows], speed.caption)
+    return side_view_frames(result, rows, speed.caption, follow)
 
 
-def captioned(pictures: Frames, times: np.ndarray, caption: str) -> Frames:
+def with_captions(pictures: Frames, times: np.ndarray, caption: str) -> Frames:
     """Yield pictures with the time and the speed of the film in their upper corners."""
     from PIL import Image, ImageDraw, ImageFont
 
@@ -191,15 +204,16 @@ def captioned(pictures: Frames, times: np.ndarray, caption: str) -> Frames:
         yield np.array(image)
 
 
-def drawn_frames(
+def side_view_frames(
     result: Result, rows: np.ndarray, caption: str, follow: bool
 ) -> Frames:
-    """Yield pictures of a walk as they are drawn from the side."""
+    """Yield pictures of a walk from the side."""
     canvas, update = walk_canvas(result, rows, caption, follow)
     for row in rows:
         update(row)
         canvas.draw()
-        canvas.figure.set_layout_engine("none")  # so that the axes stand still
+        # Further layouts would move the axes.
+        canvas.figure.set_layout_engine("none")
         yield np.array(canvas.buffer_rgba())[..., :3]
 
 
@@ -208,14 +222,15 @@ def walk_canvas(result: Result, rows: np.ndarray, caption: str, follow: bool) ->
     """Return (canvas, function that moves the robot to a row)."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    fig, axes = plots.figure(WIDE, TALL[1])
+    fig, axes = plots.figure(WALK_WIDTH, WALK_HEIGHTS[1])
     ax = axes[0, 0]
     update = walk_stage(ax, result, rows, follow)
-    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
-    height = (WIDE - LABELS) * (high - low) / (right - left) + LABELS
-    fig.set_figheight(float(np.clip(height, *TALL)))
+    left, right = ax.get_xlim()
+    low, high = ax.get_ylim()
+    height = (WALK_WIDTH - LABELS) * (high - low) / (right - left) + LABELS
+    fig.set_figheight(float(np.clip(height, *WALK_HEIGHTS)))
     ax.set_title(caption, loc="right", fontsize=8, color="0.3")
-    fig.set_dpi(DOTS)
+    fig.set_dpi(DPI)
     return FigureCanvasAgg(fig), update
 
 
@@ -223,8 +238,8 @@ def walk_canvas(result: Result, rows: np.ndarray, caption: str, follow: bool) ->
 
 
 def write(path: Path, frames: Frames, rate: int) -> None:
-    """Write pictures at a rate (1/s) as the film that the ending names; whole or not at
-    all."""
+    """Write pictures at a rate (1/s) as a film in the format of the ending. The file
+    appears whole or not at all."""
     encode: Callable[[Path, Frames, int], None] = write_gif
     if path.suffix.lower() == ".mp4":
         encode = write_mp4
@@ -233,14 +248,15 @@ def write(path: Path, frames: Frames, rate: int) -> None:
 
 
 def write_gif(path: Path, frames: Frames, rate: int) -> None:
-    """Write a GIF with one palette for all frames, so that nothing flickers."""
+    """Write a GIF with one palette for all frames, which avoids flicker."""
     from PIL import Image
 
-    plain = Image.Dither.NONE
-    most = Image.Quantize.MAXCOVERAGE
-    first = Image.fromarray(next(frames)).quantize(255, most, dither=plain)
+    undithered = Image.Dither.NONE
+    coverage = Image.Quantize.MAXCOVERAGE
+    first = Image.fromarray(next(frames)).quantize(255, coverage, dither=undithered)
     rest = (
-        Image.fromarray(frame).quantize(palette=first, dither=plain) for frame in frames
+        Image.fromarray(frame).quantize(palette=first, dither=undithered)
+        for frame in frames
     )
     with path.open("wb") as file:
         first.save(
@@ -254,20 +270,20 @@ def write_gif(path: Path, frames: Frames, rate: int) -> None:
 
 
 def write_mp4(path: Path, frames: Frames, rate: int) -> None:
-    """Write an MP4 by handing frames to ffmpeg one by one; Refusal with its last line if
-    it fails."""
+    """Write an MP4 by handing frames to ffmpeg one by one; if it fails, raise Refusal
+    with its last line."""
     first = next(frames)
-    # The usual colours of ffmpeg take even sizes.
-    tall, wide = (2 * (x // 2) for x in first.shape[:2])
+    # The usual pixel format of ffmpeg needs even sizes.
+    height, width = (2 * (size // 2) for size in first.shape[:2])
     pipes: dict[str, Any] = {
         "stdin": subprocess.PIPE,
         "stdout": subprocess.DEVNULL,
         "stderr": subprocess.PIPE,
     }
-    command = ffmpeg_command(path, wide, tall, rate)
+    command = ffmpeg_command(path, width, height, rate)
     with subprocess.Popen(command, **pipes) as ffmpeg:
         try:
-            hand(ffmpeg.stdin, first, frames, tall, wide)
+            write_raw(ffmpeg.stdin, first, frames, height, width)
             message = ffmpeg.communicate()[1]
         except BrokenPipeError:
             message = ffmpeg.stderr.read()
@@ -286,9 +302,9 @@ def write_mp4(path: Path, frames: Frames, rate: int) -> None:
         )
 
 
-def ffmpeg_command(path: Path, wide: int, tall: int, rate: int) -> list[str]:
+def ffmpeg_command(path: Path, width: int, height: int, rate: int) -> list[str]:
     """Return the command that encodes raw pictures from its standard input."""
-    pictures = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{wide}x{tall}"]
+    pictures = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}"]
     encoding = ["-an", "-pix_fmt", "yuv420p", "-y", str(path)]
     return [
         "ffmpeg",
@@ -303,8 +319,10 @@ def ffmpeg_command(path: Path, wide: int, tall: int, rate: int) -> list[str]:
     ]
 
 
-def hand(pipe: Any, first: np.ndarray, rest: Frames, tall: int, wide: int) -> None:
+def write_raw(
+    pipe: Any, first: np.ndarray, rest: Frames, height: int, width: int
+) -> None:
     """Write pictures, cut to a size, into a pipe."""
-    pipe.write(first[:tall, :wide].tobytes())
+    pipe.write(first[:height, :width].tobytes())
     for frame in rest:
-        pipe.write(frame[:tall, :wide].tobytes())
+        pipe.write(frame[:height, :width].tobytes())

@@ -1,5 +1,5 @@
-"""Connections, fields and studies as HTML for a notebook: a line, a small table or a
-picture. Nothing is computed for it. `geomech.results.html` shows results."""
+"""Connections, fields and studies as HTML for a notebook: a line, a small table and a
+picture of what is computed already. `geomech.results.html` shows results."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def page(
 
 
 def connection(fitted: Connection) -> str:
-    """Return the rows of A as arrows over shape space, or a line where shape space is no
-    plane."""
+    """Return the rows of A as arrows over shape space, or a line where shape space is
+    no plane."""
     picture = None
     if len(fitted.axes) == 2:
         picture = plots.connection_figure(fitted)
@@ -47,9 +47,10 @@ def field(values: Field) -> str:
 
 
 def study(tables: SceneTables) -> str:
-    """Return the scene and tiers of a study and, where it is computed already, the CCF
+    """Return the scene and tiers of a study and, if it is computed already, the CCF
     with the scene's gait."""
-    scene, computed = tables.scene, {key[0] for key in tables.computed}
+    scene = tables.scene
+    computed = {key[0] for key in tables.computed}
     rows = [
         ("system", system_lines(scene.system)[0]),
         ("gait", repr(scene.gait)),

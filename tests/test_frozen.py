@@ -23,7 +23,7 @@ RENEW = "if that is meant: python tests/golden.py --write"
 
 @pytest.mark.parametrize("tool", TOOLS)
 def test_commands_give_what_they_gave(tool, monkeypatch):
-    monkeypatch.setattr(films, "MOST", 3)  # of a film counts that it is one
+    monkeypatch.setattr(films, "WALK_PICTURES", 3)  # of a film counts that it is one
     lines = [line for line in COMMANDS if line.split()[0] == tool]
     found = {
         line: frozen.differs(COMMANDS[line], new)

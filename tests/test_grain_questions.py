@@ -573,13 +573,15 @@ def test_plates_in_grains_stand_beside_bars_and_the_map():
     }
     for rule, ratio in (("keep", 0.81), ("cut", 0.68)):
         stress = on_face(StressMap(tension=rule), figure.BETA)
-        assert figure.summed(deep, figure.BETA, *stress) == pytest.approx(
+        assert figure.lift_over_drag(deep, figure.BETA, *stress) == pytest.approx(
             ratio, abs=0.01
         )
     assert deep["weight"].sum() == pytest.approx(
         np.pi * campaign.BAR * campaign.TROUGH.length
     )  # half the bar's surface
-    one = figure.summed(bar, bar["beta"], bar["normal"][:, 1], bar["tangent"][:, 1])
+    one = figure.lift_over_drag(
+        bar, bar["beta"], bar["normal"][:, 1], bar["tangent"][:, 1]
+    )
     assert one == pytest.approx(bar["lift"][:, 1].sum() / bar["drag"][:, 1].sum())
     pulls = maps["keep"]["normal"] < 0
     assert (

@@ -569,9 +569,9 @@ def test_parameters_have_names_and_units():
         "radius (BL)",
         scene.gait.amplitude_label,
     ]
-    assert plots.sweeps.labels(scene, names) == named
+    assert plots.sweeps.axis_labels(scene, names) == named
     both = ["effects.end-caps.radius", "effects.disturbed-ground.radius"]
-    assert plots.sweeps.labels(scene, both) == [
+    assert plots.sweeps.axis_labels(scene, both) == [
         "end-caps: radius (BL)",
         "disturbed-ground: radius (BL)",
     ]

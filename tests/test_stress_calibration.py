@@ -449,10 +449,10 @@ def test_numbers_are_those_of_the_fit(tmp_path):
 
 
 def test_drags_are_drawn_where_the_same_plate_moves_ahead():
-    from geomech.plots.plates import _ahead
+    from geomech.plots.terradynamics import mirrored_ahead
 
     beta, gamma = np.random.default_rng(8).uniform(-360, 360, (2, 400))
-    b, g, side = _ahead(beta, gamma)
+    b, g, side = mirrored_ahead(beta, gamma)
     assert np.abs([b, g]).max() <= 90
     a_x, a_z = StressMap()(beta * RAD, gamma * RAD)
     np.testing.assert_allclose(

@@ -179,7 +179,7 @@ def test_pictures(fitted, monkeypatch):
     figures = [
         plots.stretched_figure(field, plane, [gait], unit="BL"),
         plots.ccf_figure(
-            field, [gait], style="contours", beside=(field, None), names=["a", "b"]
+            field, [gait], style="contours", other=(field, None), names=["a", "b"]
         ),
         plots.ccf_figure(field, [gait], metric=metric.fit(pulled_back, fitted.axes)),
         plots.connection_figure(fitted, style="streamlines"),

@@ -355,7 +355,7 @@ def test_sweeps_have_it(tmp_path):
     result = sweep.sweep(sand, {"gait.frequency": [1.0, 3.0]})
     one = swept_table(result)
     (_, band) = plots.sweep_figure(sand, result).axes[0].collections
-    net, _, medium, _ = plots.sweeps.drawn(result)
+    net, _, medium, _ = plots.sweeps.net_values(result)
     np.testing.assert_allclose(medium, one["frequency"] * one["medium_error"])
     box = band.get_datalim(band.axes.transData)
     assert (box.y0, box.y1) == (

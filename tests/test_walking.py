@@ -883,7 +883,7 @@ def test_films_of_a_walk_follow_the_robot_and_tell_their_speed(tmp_path):
             sum(frame.info["duration"] for frame in ImageSequence.Iterator(film)) / 1000
         )
     assert shown == pytest.approx(2 * found.walk.t[-1], abs=0.1)
-    (picture,) = films.captioned(
+    (picture,) = films.with_captions(
         iter([np.zeros((90, 400, 3), np.uint8)]), np.array([1.0]), "0.5 × real time"
     )
     assert (

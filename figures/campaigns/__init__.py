@@ -1,1 +1,2 @@
-"""Long computations by hand, whose results are shipped as CSV files beside the scripts."""
+"""Long computations by hand, whose results are shipped as CSV files beside the
+scripts."""

@@ -1,17 +1,21 @@
-"""Swims, reversals and lift in beds of grains, as CSV files; hours of computing, run by hand.
+"""Swims, reversals and lift in beds of grains, as CSV files; hours of computing, run by
+hand.
 
     python -m figures.campaigns.grains swims STORE             three and seven links
-    python -m figures.campaigns.grains swim-convergence STORE  three links with another step, stiffness or bed
-    python -m figures.campaigns.grains swim-depth STORE        three links deeper below the surface
-    python -m figures.campaigns.grains reversals STORE         a rod to and fro, across its axis and along
-    python -m figures.campaigns.grains lift STORE              bars of three sections
-    python -m figures.campaigns.grains plates STORE            plates at the angles of a round bar's leading face
-    python -m figures.campaigns.grains faces STORE             stress around the bars of `lift`, and around a shell
-    python -m figures.campaigns.grains convergence STORE       a bar with another step, stiffness, width or depth
+    python -m figures.campaigns.grains swim-convergence STORE  three links with another
+    step, stiffness or bed python -m figures.campaigns.grains swim-depth STORE
+    three links deeper below the surface python -m figures.campaigns.grains reversals
+    STORE         a rod to and fro, across its axis and along python -m
+    figures.campaigns.grains lift STORE              bars of three sections python -m
+    figures.campaigns.grains plates STORE            plates at the angles of a round
+    bar's leading face python -m figures.campaigns.grains faces STORE             stress
+    around the bars of `lift`, and around a shell python -m figures.campaigns.grains
+    convergence STORE       a bar with another step, stiffness, width or depth
 
-STORE is a folder for settled beds and runs. What is there is read and what is missing computed, so that a stopped campaign
-goes on. Each prints what it has as it comes and writes its file at the end. `BEDS`, `SWIMS`, `STROKES` and `BARS` say what
-is computed. Needs the extra grains.
+STORE is a folder for settled beds and runs. What is there is read and what is missing
+computed, so that a stopped campaign goes on. Each prints what it has as it comes and
+writes its file at the end. `BEDS`, `SWIMS`, `STROKES` and `BARS` say what is computed.
+Needs the extra grains.
 """
 
 from __future__ import annotations
@@ -33,7 +37,9 @@ from rft.grains.reversal import drags
 
 FOLDER = Path(__file__).parent
 BEDS = (1, 2, 3)  # seeds
-CIRCLE, BUTTERFLY, WAVE = "three-link-glass", "butterfly-glass", "seven-link-modes"
+CIRCLE = "three-link-glass"
+BUTTERFLY = "butterfly-glass"
+WAVE = "seven-link-modes"
 SWIMS = (  # scene, amplitude, rad, frequency, Hz
     *((CIRCLE, amplitude, 1.0) for amplitude in (1.0, 1.7, 0.5, 1.5, 2.0)),
     (BUTTERFLY, 1.0, 1.0),
@@ -41,7 +47,9 @@ SWIMS = (  # scene, amplitude, rad, frequency, Hz
     (CIRCLE, 1.0, 0.5),
     (CIRCLE, 1.7, 0.5),
 )
-STROKES = (  # amplitude, m, depth, m, and angle from its axis, degrees, of the ways of a rod 12 mm in diameter
+# amplitude, m, depth, m, and angle from its axis, degrees, of the ways of a rod 12 mm
+# in diameter
+STROKES = (
     (0.02, 0.0245, 90),
     (0.01, 0.0245, 90),
     (0.02, 0.0245, 0),
@@ -58,21 +66,23 @@ DEEPER = 0.016  # m of bed above a swimmer, or below
 SPEED = 0.1  # m/s of rods
 LONGEST_BIN = 2e-3  # m of the way of a rod to and fro
 TROUGH = Bed(length=0.06, width=0.30, depth=0.048)  # for bars across it
-BAR, BAR_DEPTH = 8e-3, 0.016  # m, radius and depth of the axis
-PLATES = (  # height, m, and tilts of the face from the underside of a cylinder, degrees; 90 is upright, 180 its top
-    (0.016, (15, 30, 50, 90, 130, 150, 165)),
-)
-THICKNESS, EDGE = (
-    3e-3,
-    3e-3,
-)  # m, of plates, and of the strips along their edges that are no middle: half a grain
+# m, radius and depth of the axis
+BAR = 8e-3
+BAR_DEPTH = 0.016
+# height, m, and tilts of the face from the underside of a cylinder, degrees; 90 is
+# upright, 180 its top
+PLATES = ((0.016, (15, 30, 50, 90, 130, 150, 165)),)
+# m, of plates, and of the strips along their edges that are no middle: half a grain
+THICKNESS = 3e-3
+EDGE = 3e-3
 GRAIN = 1e-3  # m, radius of the spheres of bars and plates
 TEXTS = "scene", "change", "shape", "part"  # columns that are no numbers
 Rows = Iterator[tuple]
 
 
 def swims(store: Path) -> Rows:
-    """Yield the displacement of every cycle of the swimmers of `SWIMS`, 162 x 12 mm, in every bed."""
+    """Yield the displacement of every cycle of the swimmers of `SWIMS`, 162 x 12 mm, in
+    every bed."""
     yield (
         "scene",
         "amplitude",
@@ -96,7 +106,8 @@ def swims(store: Path) -> Rows:
 
 
 def swim(scene: str, amplitude: float, frequency: float, seed: int) -> GrainSwim:
-    """Return a swim of a built-in scene with another amplitude (rad) and frequency (Hz)."""
+    """Return a swim of a built-in scene with another amplitude (rad) and frequency
+    (Hz)."""
     built_in = load(scene)
     gait = replace(
         built_in.gait,
@@ -107,7 +118,8 @@ def swim(scene: str, amplitude: float, frequency: float, seed: int) -> GrainSwim
 
 
 def cycles(question: GrainSwim, run: Run) -> Rows:
-    """Yield number, displacement (x and y in body lengths, heading in rad) and work, J, of every cycle of a swim."""
+    """Yield number, displacement (x and y in body lengths, heading in rad) and work, J,
+    of every cycle of a swim."""
     starts = (RAMP + np.arange(question.cycles + 1)) / question.frequency
     size = question.experiment.body.size
     work = np.diff(np.interp(starts, run.t, run.work))
@@ -118,7 +130,8 @@ def cycles(question: GrainSwim, run: Run) -> Rows:
 
 
 def swim_convergence(store: Path) -> Rows:
-    """Yield the displacement of every cycle of a circle of 1 rad, with one number of its bed changed at a time."""
+    """Yield the displacement of every cycle of a circle of 1 rad, with one number of
+    its bed changed at a time."""
     yield (
         "change",
         "cycle",
@@ -130,7 +143,8 @@ def swim_convergence(store: Path) -> Rows:
         "largest_overlap",
     )
     question = swim(CIRCLE, 1.0, 1.0, BEDS[0])
-    experiment, bed = question.experiment, question.experiment.bed
+    experiment = question.experiment
+    bed = question.experiment.bed
     changes = {
         "none": bed,
         "half the time step": replace(bed, time_step=bed.step / 2),
@@ -148,19 +162,22 @@ def swim_convergence(store: Path) -> Rows:
 
 
 def swim_depth(store: Path) -> Rows:
-    """Yield the displacement of every cycle of a circle of 1 rad in beds that are deeper above the body."""
+    """Yield the displacement of every cycle of a circle of 1 rad in beds that are
+    deeper above the body."""
     yield "depth_m", "bed", "cycle", "x_BL", "y_BL", "heading_rad", "work_J"
     for seed in BEDS:
         question = swim(CIRCLE, 1.0, 1.0, seed)
         bed = question.experiment.bed
-        deep, depth = replace(bed, depth=bed.depth + DEEPER), bed.depth / 2 + DEEPER
+        deep = replace(bed, depth=bed.depth + DEEPER)
+        depth = bed.depth / 2 + DEEPER
         run = replace(question.experiment, bed=deep, depth=depth).run(store)
         for cycle in cycles(question, run):
             yield depth, seed, *cycle
 
 
 def reversals(store: Path) -> Rows:
-    """Yield the drag along the way of a rod to and fro; it turns at one amplitude, three and five."""
+    """Yield the drag along the way of a rod to and fro; it turns at one amplitude,
+    three and five."""
     yield "amplitude_m", "depth_m", "angle_deg", "bed", "travel_m", "flank_N", "ends_N"
     radius = 6e-3
     for amplitude, depth, angle in STROKES:
@@ -193,10 +210,12 @@ def lift(store: Path) -> Rows:
 
 
 def plates(store: Path) -> Rows:
-    """Yield stress over depth on plates that are towed level: in the middle of the leading face and of the rear one, without
-    the edges, and on the whole plate, both faces and edges, over the area of one face.
+    """Yield stress over depth on plates that are towed level: in the middle of the
+    leading face and of the rear one, without the edges, and on the whole plate, both
+    faces and edges, over the area of one face.
 
-    Of either face, normal stress is positive where grains push the plate back, tangential stress where they push it up."""
+    Of either face, normal stress is positive where grains push the plate back,
+    tangential stress where they push it up."""
     names = [
         f"{part}_{way}_N/cm3"
         for part in ("face", "rear", "whole")
@@ -230,7 +249,8 @@ def plates(store: Path) -> Rows:
 
 
 def faces(store: Path) -> Rows:
-    """Yield the force on every row of spheres along the bars of `lift` and a shell, at y and z from the axis."""
+    """Yield the force on every row of spheres along the bars of `lift` and a shell, at
+    y and z from the axis."""
     yield "shape", "bed", "y_m", "z_m", "drag_N", "lift_N"
     bars = {
         shape: rod(TROUGH.length, BAR, shape, through=True, grain=GRAIN)
@@ -262,7 +282,8 @@ def steady_towed(body: Spheres, seed: int, store: Path) -> SteadyForce:
 
 
 def convergence(store: Path) -> Rows:
-    """Yield drag and lift on a round bar in one bed, with one number of the bed changed at a time."""
+    """Yield drag and lift on a round bar in one bed, with one number of the bed changed
+    at a time."""
     yield (
         "change",
         "drag_N",
@@ -279,10 +300,8 @@ def convergence(store: Path) -> Rows:
         "width 0.45 m": replace(TROUGH, width=0.45),
         "16 mm deeper": replace(TROUGH, depth=TROUGH.depth + 0.016),
     }
-    bar, tow = (
-        rod(TROUGH.length, BAR, through=True, grain=GRAIN),
-        Tow(SPEED, math.pi / 2),
-    )
+    bar = rod(TROUGH.length, BAR, through=True, grain=GRAIN)
+    tow = Tow(SPEED, math.pi / 2)
     for name, bed in changes.items():
         run = Experiment(bed, bar, tow, 0.6, depth=BAR_DEPTH).run(store)
         found = steady_force(run, BAR, tow.angle, SPEED)

@@ -1,22 +1,29 @@
-"""Which forces make a swim in grains longer or shorter than the direct tier says, as a CSV file.
+"""Which forces make a swim in grains longer or shorter than the direct tier says, as a
+CSV file.
 
     python -m figures.campaigns.swim_budget STORE
 
-STORE is the folder of runs of `figures.campaigns.grains`; swims that are not whole there are left out, none is computed.
+STORE is the folder of runs of `figures.campaigns.grains`; swims that are not whole
+there are left out, none is computed.
 
-At every phase the law is evaluated at the velocity xi that the body had in the grains. The forces of the grains minus those of
-the law sum to a wrench on every part of the body. With W(xi) the wrench of the law, W(xi_0) = 0 in its own balance and W(xi) =
--sum of the parts (the momentum of the body is one of them). With J the mean of dW/dxi between xi_0 and xi,
+At every phase the law is evaluated at the velocity xi that the body had in the grains.
+The forces of the grains minus those of the law sum to a wrench on every part of the
+body. With W(xi) the wrench of the law, W(xi_0) = 0 in its own balance and W(xi) = -sum
+of the parts (the momentum of the body is one of them). With J the mean of dW/dxi
+between xi_0 and xi,
 
     xi - xi_0 = -J^-1 sum of the parts,
 
-so that each part has its share of xi - xi_0, and by the integral over the cycle of the difference in displacement. What the
-quadratures of J and of the displacement leave is the row "rest".
+so that each part has its share of xi - xi_0, and by the integral over the cycle of the
+difference in displacement. What the quadratures of J and of the displacement leave is
+the row "rest".
 
-Where the connection A is singular in x and y, no joint rates move the body in one direction. The row "near a singularity" has
-what the quarter of the cycle with the smallest singular values of A there adds to the difference; it is part of the others.
-The rows "flank across, 3 mm" are no distances but the force of the grains on the flank over that of the law, both across and
-towards where the drag points, while it has moved by up to 3 mm since its last reversal, and more than the row before."""
+Where the connection A is singular in x and y, no joint rates move the body in one
+direction. The row "near a singularity" has what the quarter of the cycle with the
+smallest singular values of A there adds to the difference; it is part of the others.
+The rows "flank across, 3 mm" are no distances but the force of the grains on the flank
+over that of the law, both across and towards where the drag points, while it has moved
+by up to 3 mm since its last reversal, and more than the row before."""
 
 from __future__ import annotations
 
@@ -39,7 +46,8 @@ from rft.grains.drag import END
 from rft.grains.experiment import Run
 
 PHASES = 64
-ROUNDING = 1e-4  # m/s, below which dry friction is linear here; points of the body move at some 0.1 m/s
+# m/s, below which dry friction is linear here; points of the body move at some 0.1 m/s
+ROUNDING = 1e-4
 NODES, WEIGHTS = (
     x / 2 + 0.5 * (k == 0) for k, x in enumerate(np.polynomial.legendre.leggauss(6))
 )
@@ -51,10 +59,12 @@ COLUMNS = "scene", "amplitude", "frequency_Hz", "bed", "cycle", "part", "value"
 
 
 class Points(NamedTuple):
-    """Points of a body at N phases: its spheres from tail to head, between the tips of its tail and its head.
+    """Points of a body at N phases: its spheres from tail to head, between the tips of
+    its tail and its head.
 
-    heading (N, P): exp(i heading) of their links in the body frame. place, velocity (N, P): in the frame at rest, m and m/s.
-    length (P,): of body that each stands for, m, 0 of a tip. is_end (P,): within `END` half widths of a tip."""
+    heading (N, P): exp(i heading) of their links in the body frame. place, velocity
+    (N, P): in the frame at rest, m and m/s. length (P,): of body that each stands for,
+    m, 0 of a tip. is_end (P,): within `END` half widths of a tip."""
 
     heading: np.ndarray
     place: np.ndarray
@@ -63,12 +73,14 @@ class Points(NamedTuple):
     is_end: np.ndarray
 
     def velocities(self, xi: np.ndarray) -> np.ndarray:
-        """Return v_t + i v_n (N, P), m/s, at body velocities xi (N, 3), m/s and rad/s."""
+        """Return v_t + i v_n (N, P), m/s, at body velocities xi (N, 3), m/s and
+        rad/s."""
         v = (xi[:, :1] + 1j * xi[:, 1:2]) + 1j * xi[:, 2:] * self.place + self.velocity
         return v * self.heading.conj()
 
     def wrench(self, force: np.ndarray) -> np.ndarray:
-        """Return force, N, and moment about the frame's origin, N m, (N, 3) of forces f_t + i f_n (N, P), N."""
+        """Return force, N, and moment about the frame's origin, N m, (N, 3) of forces
+        f_t + i f_n (N, P), N."""
         f = force * self.heading
         return np.stack(
             [f.real.sum(1), f.imag.sum(1), (self.place.conj() * f).imag.sum(1)], 1
@@ -76,9 +88,12 @@ class Points(NamedTuple):
 
 
 def points(question: GrainSwim, phases: int = PHASES) -> Points:
-    """Return the points of the body at the middles of ``phases`` equal parts of a cycle."""
-    experiment, f = question.experiment, question.frequency
-    body, half = experiment.body, experiment.body.half_lengths
+    """Return the points of the body at the middles of ``phases`` equal parts of a
+    cycle."""
+    experiment = question.experiment
+    f = question.frequency
+    body = experiment.body
+    half = experiment.body.half_lengths
     times = (RAMP + (np.arange(phases) + 0.5) / phases) / f
     links = [body.links(*experiment.motion.joint_angles(t)) for t in times]
     heading, rates, centres, velocities = (np.array(x) for x in zip(*links))
@@ -101,8 +116,10 @@ def points(question: GrainSwim, phases: int = PHASES) -> Points:
 
 
 def law_forces(body: Points, law: Fit, caps: EndCaps, xi: np.ndarray) -> np.ndarray:
-    """Return the forces f_t + i f_n (N, P) of a law and its end caps at body velocities xi (N, 3), N."""
-    v, axial = body.velocities(xi), law.axial_force / law.rod.length
+    """Return the forces f_t + i f_n (N, P) of a law and its end caps at body velocities
+    xi (N, 3), N."""
+    v = body.velocities(xi)
+    axial = law.axial_force / law.rod.length
     t, n = law.medium.traction(v.real, v.imag, ROUNDING)
     force = -axial * body.length * (t + 1j * n)
     for tip, e in ((0, caps.tail), (-1, caps.head)):
@@ -116,14 +133,14 @@ def law_forces(body: Points, law: Fit, caps: EndCaps, xi: np.ndarray) -> np.ndar
 def measured(
     question: GrainSwim, run: Run, body: Points
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield xi (N, 3), m/s and rad/s, and forces f_t + i f_n (N, P), N, of every cycle, as means over the parts of it."""
-    phases, f = len(body.place), question.frequency
+    """Yield xi (N, 3), m/s and rad/s, and forces f_t + i f_n (N, P), N, of every cycle,
+    as means over the parts of it."""
+    phases = len(body.place)
+    f = question.frequency
     step = run.t[1] - run.t[0]
     impulse = np.cumsum(run.profile[..., 0] + 1j * run.profile[..., 1], 0) * step
-    impulse, times = (
-        np.concatenate([0 * impulse[:1], impulse]),
-        np.r_[run.t[0] - step, run.t],
-    )
+    impulse = np.concatenate([0 * impulse[:1], impulse])
+    times = np.r_[run.t[0] - step, run.t]
     for cycle in range(question.cycles):
         edges = (RAMP + cycle + np.arange(phases + 1) / phases) / f
         x, y, theta = (np.interp(edges, run.t, run.pose[:, k]) for k in range(3))
@@ -148,8 +165,10 @@ def contributions(
     xi: np.ndarray,
     force: np.ndarray,
 ) -> dict[str, np.ndarray]:
-    """Return the shares (N, 3) of xi - xi_0 by part of the body; xi_0 (N, 3): of the balance of the law."""
-    excess, ends = force - law_forces(body, law, caps, xi), body.is_end
+    """Return the shares (N, 3) of xi - xi_0 by part of the body; xi_0 (N, 3): of the
+    balance of the law."""
+    excess = force - law_forces(body, law, caps, xi)
+    ends = body.is_end
     wrenches = {
         "ends, along": body.wrench(np.where(ends, excess.real, 0.0)),
         "ends, across": body.wrench(np.where(ends, 1j * excess.imag, 0.0)),
@@ -177,8 +196,8 @@ def slopes(body: Points, law: Fit, caps: EndCaps, xi: np.ndarray) -> np.ndarray:
 
 
 def distance(xi: np.ndarray, step: float) -> tuple[float, np.ndarray]:
-    """Return the distance of a cycle of body velocities xi (N, 3), m, by the midpoint rule with ``step`` (s) between phases,
-    and its slopes (N, 3)."""
+    """Return the distance of a cycle of body velocities xi (N, 3), m, by the midpoint
+    rule with ``step`` (s) between phases, and its slopes (N, 3)."""
     heading = np.exp(1j * step * (np.cumsum(xi[:, 2]) - xi[:, 2] / 2))
     moves = step * heading * (xi[:, 0] + 1j * xi[:, 1])
     net = moves.sum()
@@ -192,7 +211,8 @@ def distance(xi: np.ndarray, step: float) -> tuple[float, np.ndarray]:
 def shares(
     xi_0: np.ndarray, xi: np.ndarray, parts: dict[str, np.ndarray], step: float
 ) -> dict[str, np.ndarray]:
-    """Return the shares (N,) of phases and parts of the body in the difference between the distances of xi and xi_0, m."""
+    """Return the shares (N,) of phases and parts of the body in the difference between
+    the distances of xi and xi_0, m."""
     slope = sum(
         w * distance(xi_0 + node * (xi - xi_0), step)[1]
         for node, w in zip(NODES, WEIGHTS)
@@ -207,8 +227,8 @@ def shares(
 
 
 class Swum(NamedTuple):
-    """A cycle. xi_0, xi (N, 3), m/s and rad/s, by the law and in grains. shares (N,), m, by part. forces: (2, N, P), N, of the
-    grains and of the law at xi."""
+    """A cycle. xi_0, xi (N, 3), m/s and rad/s, by the law and in grains. shares (N,),
+    m, by part. forces: (2, N, P), N, of the grains and of the law at xi."""
 
     xi_0: np.ndarray
     xi: np.ndarray
@@ -218,7 +238,9 @@ class Swum(NamedTuple):
 
 def budget(question: GrainSwim, run: Run, law: Fit, caps: EndCaps) -> Iterator[Swum]:
     """Yield every cycle beside the direct tier with a law and its end caps."""
-    body, f, size = points(question), question.frequency, question.experiment.body.size
+    body = points(question)
+    f = question.frequency
+    size = question.experiment.body.size
     alpha, alphadot = gait(question)
     xi_0 = (
         ruled(question, law, caps).velocity(alpha, alphadot)
@@ -240,13 +262,14 @@ def ruled(question: GrainSwim, law: Fit, caps: EndCaps) -> Swimmer:
 
 def gait(question: GrainSwim) -> tuple[np.ndarray, np.ndarray]:
     """Return shapes and rates (N, joints) at the phases."""
-    phases, g = 2 * np.pi * (np.arange(PHASES) + 0.5) / PHASES, question.scene.gait
+    phases = 2 * np.pi * (np.arange(PHASES) + 0.5) / PHASES
+    g = question.scene.gait
     return np.array([g.shape(t) for t in phases]), np.array([g.rate(t) for t in phases])
 
 
 def near_singular(question: GrainSwim, law: Fit, caps: EndCaps) -> np.ndarray:
-    """Return which quarter of the phases (N,) is nearest to shapes where A, fitted by least squares over directions, is
-    singular in x and y."""
+    """Return which quarter of the phases (N,) is nearest to shapes where A, fitted by
+    least squares over directions, is singular in x and y."""
     rates = np.stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)], -1)
     alpha, _ = np.broadcast_arrays(gait(question)[0][:, None], rates)
     xi = ruled(question, law, caps).velocity(alpha, np.broadcast_to(rates, alpha.shape))
@@ -256,11 +279,13 @@ def near_singular(question: GrainSwim, law: Fit, caps: EndCaps) -> np.ndarray:
 
 
 def recovery(body: Points, swum: Swum, step: float) -> Iterator[float]:
-    """Yield the force of the grains across the flank over that of the law, by travel since a reversal up to `TRAVELS`."""
+    """Yield the force of the grains across the flank over that of the law, by travel
+    since a reversal up to `TRAVELS`."""
     flank = ~body.is_end
     v = body.velocities(swum.xi).imag[:, flank]
     grains, law = swum.forces[..., flank].imag * -np.sign(v)
-    travel, since = np.zeros_like(v), np.zeros(v.shape[1])
+    travel = np.zeros_like(v)
+    since = np.zeros(v.shape[1])
     for k in 2 * list(range(len(v))):  # once more, for what came before the first phase
         since = (
             np.where(np.sign(v[k]) == np.sign(v[k - 1]), since, 0.0)
@@ -273,7 +298,8 @@ def recovery(body: Points, swum: Swum, step: float) -> Iterator[float]:
 
 
 def rows(store: Path) -> Iterator[tuple]:
-    """Yield the distance by the law and in grains, and the shares of parts, body lengths, for swims that are in the store."""
+    """Yield the distance by the law and in grains, and the shares of parts, body
+    lengths, for swims that are in the store."""
     yield COLUMNS
     law = rod_fit(FLANK, end_caps="fitted")
     for scene, amplitude, frequency in SWIMS:
@@ -282,8 +308,10 @@ def rows(store: Path) -> Iterator[tuple]:
             body = question.experiment.body
             if question.experiment.steps_left(store):
                 continue
-            run, step = question.experiment.run(store), 1 / (PHASES * frequency)
-            caps, points_of = law.caps(body.half_width / body.size), points(question)
+            run = question.experiment.run(store)
+            step = 1 / (PHASES * frequency)
+            caps = law.caps(body.half_width / body.size)
+            points_of = points(question)
             near = (
                 near_singular(question, law, caps)
                 if body.joints == 2

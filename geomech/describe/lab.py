@@ -51,7 +51,7 @@ def lab(
     needs no network and nothing installed: map, swimmer, and displacement of a cycle by
     three tiers with their errors."""
     # The mechanics of scenes takes longer to load than the help of this command.
-    from geomech.lab import check_format, opened, write
+    from geomech.lab import check_format, page_path, write
     from geomech.studies.lab import GALLERY, Lab
 
     if out is not None:
@@ -59,7 +59,7 @@ def lab(
     scenes = load_scenes(names or GALLERY)
     request = Lab(scenes, parameters(over or (), scenes[0]))
     inputs = request.inputs()
-    with opened(out) as path:
+    with page_path(out) as path:
         request.check()
         outputs = [pipeline.Output(path, write)]
         pipeline.refuse_unwritable(outputs, inputs)

@@ -1,7 +1,9 @@
-"""The page of the gait lab: one file that needs no server, no network and nothing installed.
+"""The page of the gait lab: one file that needs no server, no network and nothing
+installed.
 
-Its tables are base64 texts of numbers in single precision, its script and style stand in it and are allowed by their hashes
-alone, so that nothing else runs and nothing is fetched. Names and texts of scenes are data, never markup."""
+Its tables are base64 texts of numbers in single precision. Its script and style are
+part of it and are allowed by their hashes alone, so that nothing else runs and nothing
+is fetched. Names and texts of scenes are data, never markup."""
 
 from __future__ import annotations
 
@@ -25,12 +27,12 @@ from geomech.geometry.gait import LARGEST
 from geomech.io.files import atomic_file
 from geomech.scenes.key import keys_of
 from geomech.scenes.write import text_of, without_gait
-from geomech.studies.charts import SHARES, Chart, series_of
+from geomech.studies.charts import SHARES, Chart, Family, series_of
 from geomech.systems.base import body_size, length_unit, shape_labels
 from rft.core.refusal import Refusal
 
 FOLDER = Path(__file__).parent
-SCRIPTS = (
+SCRIPTS = (  # in the order in which they run
     "numbers",
     "toml",
     "loops",
@@ -41,20 +43,13 @@ SCRIPTS = (
     "swimmer",
     "curve",
     "page",
-)  # in this order
-READ = (
-    "circle",
-    "ellipse",
-    "butterfly",
-    "fourier",
-    "points",
-)  # kinds of gaits of files that the page opens
+)
+# Kinds of gaits that the page can open from a file.
+FILE_GAITS = ("circle", "ellipse", "butterfly", "fourier", "points")
 COLOURS = 65  # of the map's scale
-ESCAPED = {
-    "<": "\\u003c",
-    ">": "\\u003e",
-    "&": "\\u0026",
-}  # in JSON, so that no text can end its element
+# Escapes in JSON, without which a text could end its HTML element.
+ESCAPES = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026"}
+FRAME_PARTS = ("A", "ccf", "ccf_error", "pose")
 
 
 def check_format(path: Path) -> None:
@@ -68,8 +63,9 @@ def check_format(path: Path) -> None:
 
 
 @contextmanager
-def opened(path: Path | None) -> Iterator[Path]:
-    """Give a path to write the page to: the one named, or one in a temporary folder that a browser then opens."""
+def page_path(path: Path | None) -> Iterator[Path]:
+    """Yield a path to write the page to: the one given, or one in a temporary folder,
+    which a browser opens at the end."""
     if path is not None:
         yield path
         return
@@ -91,16 +87,19 @@ def write(charts: list[Chart], path: Path) -> None:
 def page(charts: list[Chart]) -> str:
     """Return the page of some charts as HTML."""
     style = (FOLDER / "lab.css").read_text(encoding="utf-8")
-    script = "".join(
-        ['"use strict";\n(() => {\n', *(_script(name) for name in SCRIPTS), "})();\n"]
-    )
+    scripts = "".join(_script(name) for name in SCRIPTS)
+    script = f'"use strict";\n(() => {{\n{scripts}}})();\n'
     parts = {
-        "STYLE_HASH": _hash(style), "SCRIPT_HASH": _hash(script), "STYLE": style, "SCRIPT": script, "DATA": _json(data(charts)),
-    }  # fmt: skip
-    pieces = (
-        (FOLDER / "lab.html").read_text(encoding="utf-8").split("%%")
-    )  # text, name, text, name ...
-    return "".join(parts[x] if k % 2 else x for k, x in enumerate(pieces))
+        "STYLE_HASH": _hash(style),
+        "SCRIPT_HASH": _hash(script),
+        "STYLE": style,
+        "SCRIPT": script,
+        "DATA": _json(data(charts)),
+    }
+    # The template alternates between text and the name of a part.
+    pieces = (FOLDER / "lab.html").read_text(encoding="utf-8").split("%%")
+    pieces[1::2] = [parts[name] for name in pieces[1::2]]
+    return "".join(pieces)
 
 
 def _script(name: str) -> str:
@@ -112,32 +111,32 @@ def _hash(text: str) -> str:
 
 
 def _checksum(text: str) -> str:
-    # a name of a file may hold bytes that are no text
+    # The name of a file may hold bytes that are not text.
     raw = text.encode(errors="backslashreplace")
     return hashlib.sha256(raw).hexdigest()[:12]
 
 
 def _json(values: Any) -> str:
     text = json.dumps(values, separators=(",", ":"), allow_nan=False)
-    for letter, escaped in ESCAPED.items():
-        text = text.replace(letter, escaped)
+    for letter, escape in ESCAPES.items():
+        text = text.replace(letter, escape)
     return text
 
 
 def data(charts: list[Chart]) -> dict[str, Any]:
-    """Return what the script of the page reads: scenes, and their tables, each once, by a name that they share."""
+    """Return what the script of the page reads: scenes that name their tables, and the
+    tables by name, each once."""
     from cmcrameri import cm
 
     tables: dict[str, str] = {}
-    colours = (
-        (255 * cm.vik(np.linspace(0, 1, COLOURS))[:, :3]).round().astype(int).tolist()
-    )
+    rgb = 255 * cm.vik(np.linspace(0, 1, COLOURS))[:, :3]
+    colours = rgb.round().astype(int).tolist()
     scenes = [_scene(chart, tables) for chart in charts]
     return {
         "version": VERSION,
         "colours": colours,
         "shares": SHARES,
-        "gaits": _declared(),
+        "gaits": _gait_keys(),
         "largest": LARGEST,
         "scenes": scenes,
         "tables": tables,
@@ -145,11 +144,15 @@ def data(charts: list[Chart]) -> dict[str, Any]:
 
 
 def _scene(chart: Chart, tables: dict[str, str]) -> dict[str, Any]:
-    scene, system = chart.scene, chart.scene.system
+    """Return a scene as the page reads it, and add its tables to ``tables``."""
+    scene = chart.scene
+    system = scene.system
     family = chart.family
     is_varied = family is not None and family.key.startswith("medium.")
     text = text_of(without_gait(scene, spell_out=is_varied))
-    first = scene.text.split("\n", 1)[0]
+    toml = [text]
+    if family is not None:
+        toml = _around_value(text, family.key)
 
     def stored(values: np.ndarray) -> str:
         text = base64.b64encode(np.ascontiguousarray(values, "<f4").tobytes()).decode()
@@ -157,17 +160,17 @@ def _scene(chart: Chart, tables: dict[str, str]) -> dict[str, Any]:
         tables[name] = text
         return name
 
-    parts = ("A", "ccf", "ccf_error", "pose")
-    frames = {
-        name: {
-            part: stored(x) for part in parts if (x := getattr(frame, part)) is not None
-        }
-        for name, frame in chart.frames.items()
-    }
+    frames: dict[str, dict[str, str]] = {}
+    for name, frame in chart.frames.items():
+        frames[name] = {}
+        for part in FRAME_PARTS:
+            values = getattr(frame, part)
+            if values is not None:
+                frames[name][part] = stored(values)
     return {
         "name": scene.name,
-        "about": first.lstrip("# ") if first.startswith("#") else "",
-        "toml": [text] if family is None else _around_value(text, family.key),
+        "about": _about(scene.text),
+        "toml": toml,
         "checksum": _checksum(text),
         "unit": length_unit(system),
         "length": body_size(system),
@@ -182,19 +185,41 @@ def _scene(chart: Chart, tables: dict[str, str]) -> dict[str, Any]:
         "residual": stored(chart.residual),
         "outline": stored(chart.outline),
         "frames": frames,
-        "family": None if family is None else {
-            "key": family.key, "values": family.values.tolist(), "knots": family.knots.tolist(), "degree": family.degree,
-            "own": family.own, "error": family.error,
-        },
-    }  # fmt: skip
+        "family": _family(family),
+    }
+
+
+def _about(text: str) -> str:
+    """Return the comment on the first line of a scene's text, or ""."""
+    first = text.split("\n", 1)[0]
+    if first.startswith("#"):
+        return first.lstrip("# ")
+    return ""
+
+
+def _family(family: Family | None) -> dict[str, Any] | None:
+    """Return the key of a scene that the page can vary, with its values."""
+    if family is None:
+        return None
+    return {
+        "key": family.key,
+        "values": family.values.tolist(),
+        "knots": family.knots.tolist(),
+        "degree": family.degree,
+        "own": family.own,
+        "error": family.error,
+    }
 
 
 def _gait(gait: Gait) -> dict[str, Any]:
-    """Return a gait as the page has loops: a Fourier series, or points."""
+    """Return a gait in the form of the page's loops: a Fourier series, or points."""
     shared = {
-        "kind": type(gait).__name__.lower(), "amplitude": gait.amplitude, "centre": gait.middle.tolist(),
-        "reverse": bool(gait.reverse), "frequency": gait.frequency,
-    }  # fmt: skip
+        "kind": type(gait).__name__.lower(),
+        "amplitude": gait.amplitude,
+        "centre": gait.middle.tolist(),
+        "reverse": bool(gait.reverse),
+        "frequency": gait.frequency,
+    }
     if isinstance(gait, Points):
         return {**shared, "points": [list(p) for p in gait.points]}
     mean, cos, sin = series_of(gait)
@@ -202,32 +227,33 @@ def _gait(gait: Gait) -> dict[str, Any]:
     return {**shared, "cos": cos.tolist(), "sin": sin.tolist()}
 
 
-def _declared() -> dict[str, dict[str, Any]]:
-    """Return what the [gait] of each kind that the page reads may say, by kind and key,
-    as the scenes' reader has it. degrees: the key may be given as KEY_deg."""
-    return {
-        kind: {
-            key.name: {
+def _gait_keys() -> dict[str, dict[str, Any]]:
+    """Return the keys of [gait] by kind and name, for each kind that the page reads.
+
+    They are those of the scenes' reader. degrees: the key may be given as KEY_deg."""
+    gaits: dict[str, dict[str, Any]] = {}
+    for kind in FILE_GAITS:
+        gaits[kind] = {}
+        for key in keys_of(GAITS[kind]):
+            gaits[kind][key.name] = {
                 "schema": key.schema,
                 "required": key.required,
                 "default": key.default,
                 "degrees": key.degrees,
             }
-            for key in keys_of(GAITS[kind])
-        }
-        for kind in READ
-    }
+    return gaits
 
 
 def _around_value(text: str, name: str) -> list[str]:
-    """Return a scene's text before and after the value of ``SECTION.KEY``. The text is
-    of our own writer, which puts each key of a section on a line."""
+    """Return a scene's text before and after the value of ``SECTION.KEY``.
+
+    The text comes from `text_of`, which writes each key of a section on a line."""
     section, _, key = name.partition(".")
     lines = text.split("\n")
     first = lines.index(f"[{section}]") + 1
-    place = next(
-        k for k in range(first, len(lines)) if lines[k].startswith(f"{key} = ")
-    )
+    place = first
+    while not lines[place].startswith(f"{key} = "):
+        place += 1
     before = "\n".join([*lines[:place], f"{key} = "])
     after = "\n".join(["", *lines[place + 1 :]])
     return [before, after]

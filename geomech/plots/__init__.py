@@ -1,5 +1,9 @@
-"""Plots: each draws on the Axes that it is given and returns it; without any on pyplot's current Axes if a figure of pyplot
-is open, else on a new one, which a notebook shows. Nothing here imports pyplot or changes its state.
+"""Plots of results and of what they are computed from.
+
+A plot draws on the Axes that it is given and returns it. Without any it draws on
+pyplot's current Axes if a figure of pyplot is open, else on new ones, which a notebook
+shows.
+Nothing here imports pyplot or changes its state.
 """
 
 from geomech.plots.displacements import (

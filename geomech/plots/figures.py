@@ -1,9 +1,10 @@
-"""Whole figures of a connection and of a CCF: three components side by side, two body frames one above the other."""
+"""Whole figures of a connection and of a CCF: three components side by side, two body
+frames one above the other."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -21,20 +22,16 @@ from geomech.plots.maps import (
     ccf_map,
     ccf_name,
     draw_gait,
-    has,
+    has_component,
     has_row,
     largest,
-    limit_of,
-    panels_of,
+    note_zero_components,
+    panel_components,
     row_name,
-    say_left_out,
+    scale_limit,
 )
-from geomech.plots.style import blank, figure, quantity, styled
-from geomech.plots.styles import (
-    CCF_STYLES,
-    CONNECTION_STYLES,
-    MINUS_SIGN,
-)
+from geomech.plots.style import blank, figure, quantity, styled, with_minus_signs
+from geomech.plots.styles import CCF_STYLES, CONNECTION_STYLES
 from geomech.results.fields import Slice
 
 if TYPE_CHECKING:
@@ -43,18 +40,27 @@ if TYPE_CHECKING:
 SHADOW = "dashed: the gait, seen along the joints that are held here"
 
 
+# Connections
+
+
 @styled
 def connection_figure(
-    connection: Connection, *, labels: Labels = ANGLES, style: str = "quiver",
-    beside: Connection | None = None, names: Sequence[str] = (), components: Sequence[str] = (),
+    connection: Connection,
+    *,
+    labels: Labels = ANGLES,
+    style: str = "quiver",
+    other: Connection | None = None,
+    names: Sequence[str] = (),
+    components: Sequence[str] = (),
     clim: float | str | None = None,
-) -> Figure:  # fmt: skip
-    """Draw the rows of A side by side, but for those that are zero everywhere, as arrows ("quiver") or "streamlines", each row
-    on a scale of its own.
+) -> Figure:
+    """Draw the rows of A side by side, without those that are zero everywhere, as
+    arrows ("quiver") or "streamlines", each row on a scale of its own.
 
-    beside: the connection in another body frame, drawn below on the same scales. names: of the two frames. components:
-    of WORDS, drawn even where they are zero. clim: top of the scales, a number or a percentile of a row's lengths such as
-    "98%", their largest if left out.
+    other: the connection in another body frame, drawn below on the same scales. names:
+    of the two frames. components: "x", "y" and "theta", drawn even where they are zero.
+    clim: top of the scales, a number or a percentile of a row's lengths such as "98%";
+    by default their largest.
 
     Examples
     --------
@@ -63,27 +69,78 @@ def connection_figure(
     >>> fig = geomech.plots.connection_figure(study.fitted, components=["x", "theta"])
     """
     draw = CONNECTION_STYLES[choose("style", style, CONNECTION_STYLES)]
-    rows = [connection] if beside is None else [connection, beside]
-    panels = panels_of(components, [[has_row(c, k) for k in range(3)] for c in rows])
-    fig, axes = figure(
-        0.3 + 3.5 * len(panels),
-        3.0 + 2.7 * (len(rows) - 1),
-        len(panels),
-        len(rows),
-        layout="compressed",
-    )
+    connections = [connection]
+    if other is not None:
+        connections.append(other)
+    panels = panel_components(components, [_rows_present(c) for c in connections])
+    fig, axes = _connection_panels(panels, len(connections))
     for k, component in enumerate(panels):
-        tops = [
-            limit_of(np.hypot(*c.A[component]), clim)
-            for c in rows
-            if has_row(c, component)
-        ]
-        top = None if beside is None and clim is None else max(tops, default=None)
-        for c, ax in zip(rows, axes[:, k]):
+        top = None
+        if other is not None or clim is not None:
+            tops = [
+                scale_limit(np.hypot(*c.A[component]), clim)
+                for c in connections
+                if has_row(c, component)
+            ]
+            top = max(tops, default=None)
+        for c, ax in zip(connections, axes[:, k]):
             draw(c, component, ax=ax, labels=labels, top=top)
-    _name(axes, names)
-    say_left_out(fig, panels, components, row_name)
+    _name_rows(axes, names)
+    note_zero_components(fig, panels, components, row_name)
     return fig
+
+
+@styled
+def plane_connection_figure(
+    planes: Sequence[Plane | Slice],
+    *,
+    labels: Labels | None = None,
+    style: str = "quiver",
+    components: Sequence[str] = (),
+    clim: float | str | None = None,
+) -> Figure:
+    """Draw the rows of A of the two joints that move, on planes of shape space, a line
+    of panels for each pair of joints.
+
+    labels: as for `planes_figure`. Other arguments as for `connection_figure`.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("seven-link-wave", grid=7).tables
+    >>> fig = geomech.plots.plane_connection_figure([study.plane((0, 5))])
+    """
+    draw = CONNECTION_STYLES[choose("style", style, CONNECTION_STYLES)]
+    labels = labels or _angle_labels(len(planes[0].at))
+    present = [_rows_present(plane.connection) for plane in planes]
+    panels = panel_components(components, present)
+    fig, axes = _connection_panels(panels, len(planes))
+    for plane, row in zip(planes, axes):
+        connection = plane.connection
+        pair = [labels[k] for k in plane.pair]
+        for component, ax in zip(panels, row):
+            top = None
+            if clim is not None:
+                top = scale_limit(np.hypot(*connection.A[component][:2]), clim)
+            draw(connection, component, ax=ax, labels=pair, top=top)
+    _name_rows(axes, [plane_title(plane, labels) for plane in planes])
+    note_zero_components(fig, panels, components, row_name)
+    return fig
+
+
+def _connection_panels(panels: Sequence[int], rows: int) -> tuple[Any, Any]:
+    """Return (Figure, Axes) for these components of some connections."""
+    columns = len(panels)
+    width = 0.3 + 3.5 * columns
+    height = 3.0 + 2.7 * (rows - 1)
+    return figure(width, height, columns, rows, layout="compressed")
+
+
+def _rows_present(connection: Connection) -> list[bool]:
+    return [has_row(connection, k) for k in range(3)]
+
+
+# CCFs
 
 
 @styled
@@ -94,10 +151,11 @@ def pairs_figure(
     *,
     labels: Labels | None = None,
 ) -> Figure:
-    """Draw one component of the CCF of all pairs of joints, on the planes through the shape ``at`` (d,), on one scale.
+    """Draw one component of the CCF of all pairs of joints, on the planes through a
+    shape, on one scale.
 
-    labels: (name, unit) of each shape variable."""
-    labels = labels or [(f"alpha_{k + 1}", "rad") for k in range(form.field.joints)]
+    at: the shape (d,), rad. labels: (name, unit) of each shape variable."""
+    labels = labels or _angle_labels(form.field.joints)
     fields = [form.slice(i, j, at) for i, j in form.pairs]
     columns = min(3, len(fields))
     rows = -(-len(fields) // columns)
@@ -105,22 +163,97 @@ def pairs_figure(
     top = max(largest(f.values[component]) for f in fields)
     for (i, j), field, ax in zip(form.pairs, fields, axes.ravel()):
         ccf_map(field, component, ax=ax, labels=(labels[i], labels[j]), clim=top)
-        fixed = ", ".join(
-            f"{quantity(labels[k][0])} = {at[k]:g}".replace("-", MINUS_SIGN)
-            for k in range(len(labels))
-            if k not in (i, j)
-        )
-        ax.set_title(
-            f"{ax.get_title()}, {i + 1}{j + 1}" + f"; {fixed}" * bool(fixed), fontsize=8
-        )
+        title = f"{ax.get_title()}, {i + 1}{j + 1}"
+        fixed = [k for k in range(len(labels)) if k not in (i, j)]
+        if fixed:
+            angles = [f"{quantity(labels[k][0])} = {at[k]:g}" for k in fixed]
+            title += f"; {with_minus_signs(', '.join(angles))}"
+        ax.set_title(title, fontsize=8)
     for ax in axes.ravel()[len(fields) :]:
         ax.set_axis_off()
     return fig
 
 
-class Row(NamedTuple):
-    """A row of maps of a CCF. error: of the field, or None. shadows: curves of gaits that move elsewhere, seen on the
-    plane."""
+@styled
+def ccf_figure(
+    field: Field,
+    gaits: Sequence[Gait] = (),
+    *,
+    error: Field | None = None,
+    labels: Labels = ANGLES,
+    style: str = "map",
+    metric: Metric | Finsler | None = None,
+    other: tuple[Field, Field | None] | None = None,
+    names: Sequence[str] = (),
+    components: Sequence[str] = (),
+    clim: float | str | None = None,
+) -> Figure:
+    """Draw the components of the CCF side by side with gaits on them, without those
+    that are zero everywhere, as colours ("map"), "contours" or a "surface".
+
+    error: of the field, as for `ccf_map`. metric: drawn as rings on a map. other:
+    (CCF, error) in another body frame, drawn below on the same scales. names: of the
+    two frames. components: "x", "y" and "theta", drawn even where they are zero. clim:
+    limit of the colours on either side of zero, a number or a percentile of the values'
+    size such as "98%"; by default their largest.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("three-link-viscous", grid=15).tables
+    >>> ccf = study.curvature
+    >>> fig = geomech.plots.ccf_figure(ccf, [study.scene.gait], components=["x"])
+    """
+    rows = [MapRow(field, error, gaits, labels)]
+    if other is not None:
+        rows.append(MapRow(*other, gaits, labels))
+    return _draw_rows(rows, style, metric, names, True, components, clim)
+
+
+@styled
+def planes_figure(
+    planes: Sequence[Plane | Slice],
+    gait: Gait | None = None,
+    *,
+    labels: Labels | None = None,
+    style: str = "map",
+    other: Plane | Slice | None = None,
+    names: Sequence[str] = (),
+    components: Sequence[str] = (),
+    clim: float | str | None = None,
+) -> Figure:
+    """Draw the CCF of pairs of joints on planes of shape space, a line of panels for
+    each pair.
+
+    gait: of all joints. Where it leaves the plane, it is dashed, as it is seen along
+    the fixed joints, and its area is not shaded. labels: (name, unit) of all shape
+    variables.
+    other: the plane of a single pair in another body frame, below on the same scales.
+    names: of the two frames. Other arguments as for `ccf_figure`.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> study = geomech.study("seven-link-wave", grid=7).tables
+    >>> fig = geomech.plots.planes_figure([study.plane((0, 5))], study.scene.gait)
+    """
+    labels = labels or _angle_labels(len(planes[0].at))
+    drawn = [*planes]
+    titles = [plane_title(plane, labels) for plane in planes]
+    if other is not None:
+        drawn.append(other)
+    if names:
+        angles = [plane_title(plane, labels) for plane in drawn]
+        titles = [f"{title}; frame {name}" for title, name in zip(angles, names)]
+    rows = [_plane_row(plane, gait, labels) for plane in drawn]
+    return _draw_rows(rows, style, None, titles, other is not None, components, clim)
+
+
+class MapRow(NamedTuple):
+    """A line of maps of a CCF, one for each component.
+
+    error: of the field, or None. gaits: drawn on the maps. labels: of the two shape
+    variables. shadows: curves of gaits that leave the plane, seen on it."""
 
     field: Field
     error: Field | None
@@ -129,233 +262,162 @@ class Row(NamedTuple):
     shadows: Sequence = ()
 
 
-@styled
-def ccf_figure(
-    field: Field, gaits: Sequence[Gait] = (), *, error: Field | None = None, labels: Labels = ANGLES,
-    style: str = "map", metric: Metric | Finsler | None = None, beside: tuple[Field, Field | None] | None = None,
-    names: Sequence[str] = (), components: Sequence[str] = (), clim: float | str | None = None,
-) -> Figure:  # fmt: skip
-    """Draw the components of the CCF side by side with gaits on them, but for those that are zero everywhere, as colours
-    ("map"), "contours" or a "surface".
-
-    metric: its rings on a map. beside: (CCF, error) in another body frame, drawn below on the same scales. names: of the two
-    frames. components: of WORDS, drawn even where they are zero. clim: limit of the colours on either side of zero, a number or
-    a percentile of the values' size such as "98%"; their largest if left out.
-
-    Examples
-    --------
-    >>> import geomech
-    >>> study = geomech.study("three-link-viscous", grid=15).tables
-    >>> fig = geomech.plots.ccf_figure(study.curvature, gaits=[study.scene.gait], error=study.curvature_error, components=["x"])
-    """
-    rows = [Row(field, error, gaits, labels)] + (
-        [] if beside is None else [Row(*beside, gaits, labels)]
-    )
-    return _ccf_rows(rows, style, metric, names, True, components, clim)
+def _plane_row(plane: Plane | Slice, gait: Gait | None, labels: Labels) -> MapRow:
+    """Return the maps of a plane, with the gait on it or as a shadow."""
+    gaits = []
+    shadows = []
+    if gait is not None:
+        projected = ProjectedGait(gait, plane)
+        if projected.lies_in_plane:
+            gaits.append(projected)
+        else:
+            shadows.append(projected)
+    pair = [labels[k] for k in plane.pair]
+    return MapRow(plane.ccf, plane.error, gaits, pair, shadows)
 
 
-@styled
-def planes_figure(
-    planes: Sequence[Plane | Slice], gait: Gait | None = None, *, labels: Labels | None = None, style: str = "map",
-    beside: Plane | Slice | None = None, names: Sequence[str] = (), components: Sequence[str] = (),
-    clim: float | str | None = None,
-) -> Figure:  # fmt: skip
-    """Draw the CCF of pairs of joints on planes of shape space, a row for each pair, as `ccf_figure` does.
-
-    gait: of all joints; where it leaves the plane it is dashed, as it is seen along the fixed joints, and has no area. labels:
-    (name, unit) of all shape variables. beside: the plane of a single pair in another body frame, below on the same scales.
-    names: of the two frames. components, clim: as for `ccf_figure`.
-
-    Examples
-    --------
-    >>> import geomech
-    >>> study = geomech.study("seven-link-wave", grid=7).tables
-    >>> fig = geomech.plots.planes_figure([study.plane((0, 5))], study.scene.gait)
-    """
-    labels, rows = labels or _angles(planes), []
-    for one in [*planes, *([] if beside is None else [beside])]:
-        seen = [] if gait is None else [ProjectedGait(gait, one)]
-        on_plane, shadows = (
-            [x for x in seen if x.lies_in_plane == lies] for lies in (True, False)
-        )
-        rows.append(
-            Row(one.ccf, one.error, on_plane, [labels[k] for k in one.pair], shadows)
-        )
-    titles = [
-        f"{plane_title(one, labels)}; frame {name}"
-        for one, name in zip([planes[0], beside], names)
-    ]
-    titles = titles or [plane_title(one, labels) for one in planes]
-    return _ccf_rows(rows, style, None, titles, beside is not None, components, clim)
-
-
-@styled
-def plane_connection_figure(
-    planes: Sequence[Plane | Slice], *, labels: Labels | None = None, style: str = "quiver", components: Sequence[str] = (),
-    clim: float | str | None = None,
-) -> Figure:  # fmt: skip
-    """Draw the rows of A of the two joints that move, on planes of shape space, a row for each pair, as `connection_figure`
-    does.
-
-    labels: as for `planes_figure`.
-
-    Examples
-    --------
-    >>> import geomech
-    >>> study = geomech.study("seven-link-wave", grid=7).tables
-    >>> fig = geomech.plots.plane_connection_figure([study.plane((0, 5))])
-    """
-    draw = CONNECTION_STYLES[choose("style", style, CONNECTION_STYLES)]
-    labels = labels or _angles(planes)
-    panels = panels_of(
-        components, [[has_row(one.connection, k) for k in range(3)] for one in planes]
-    )
-    fig, axes = figure(
-        0.3 + 3.5 * len(panels),
-        3.0 + 2.7 * (len(planes) - 1),
-        len(panels),
-        len(planes),
-        layout="compressed",
-    )
-    for one, row in zip(planes, axes):
-        for component, ax in zip(panels, row):
-            top = (
-                None
-                if clim is None
-                else limit_of(np.hypot(*one.connection.A[component][:2]), clim)
-            )
-            draw(
-                one.connection,
-                component,
-                ax=ax,
-                labels=[labels[k] for k in one.pair],
-                top=top,
-            )
-    _name(axes, [plane_title(one, labels) for one in planes])
-    say_left_out(fig, panels, components, row_name)
-    return fig
-
-
-def _angles(planes: Sequence[Plane | Slice]) -> Labels:
-    """Return the labels of shape variables that are joint angles."""
-    return [(f"alpha_{k + 1}", "rad") for k in range(len(planes[0].at))]
+def _angle_labels(joints: int) -> Labels:
+    """Return labels of shape variables that are joint angles."""
+    return [(f"alpha_{k + 1}", "rad") for k in range(joints)]
 
 
 def plane_title(plane: Plane | Slice, labels: Labels) -> str:
     """Return the angles of the fixed joints of a plane as a title."""
-    angles = ", ".join(
-        f"{quantity(labels[k][0])} = {plane.at[k]:.3g}".replace("-", MINUS_SIGN)
-        for k in plane.fixed
-    )
-    return f"{angles} {labels[plane.fixed[0]][1]}" if plane.fixed else ""
+    if not plane.fixed:
+        return ""
+    angles = [f"{quantity(labels[k][0])} = {plane.at[k]:.3g}" for k in plane.fixed]
+    unit = labels[plane.fixed[0]][1]
+    return f"{with_minus_signs(', '.join(angles))} {unit}"
 
 
-def _ccf_rows(
-    rows: Sequence[Row],
+def _draw_rows(
+    rows: Sequence[MapRow],
     style: str,
-    metric,
+    metric: Metric | Finsler | None,
     names: Sequence[str],
-    same: bool,
-    components,
-    clim,
-):
-    """Draw maps of the components, a line of them for each row. same: on the same scales."""
+    same_scale: bool,
+    components: Sequence[str],
+    clim: float | str | None,
+) -> Figure:
+    """Draw the components of CCFs, a line of panels for each row.
+
+    same_scale: rows have the same limits of colours."""
     draw = CCF_STYLES[choose("style", style, CCF_STYLES)]
-    solid = getattr(draw, "projection", "") == "3d"
-    panels = panels_of(components, [[has(r.field, k) for k in range(3)] for r in rows])
-    count = len(panels)
-    if solid:
-        fig = blank(1.0 + 3.6 * count, 3.6 * len(rows))
-        axes = fig.subplots(
-            len(rows), count, squeeze=False, subplot_kw={"projection": "3d"}
-        )
-        fig.get_layout_engine().set(w_pad=0.25)
+    present = [[has_component(r.field, k) for k in range(3)] for r in rows]
+    panels = panel_components(components, present)
+    is_surface = getattr(draw, "projection", "") == "3d"
+    if is_surface:
+        fig, axes = _surface_panels(len(panels), len(rows))
     else:
-        fig, axes = figure(
-            0.3 + 3.5 * count,
-            3.2 + 2.75 * (len(rows) - 1),
-            count,
-            len(rows),
-            layout="compressed",
-        )
-        fig.get_layout_engine().set(
-            rect=(0.0, 0.0, 0.97 if len(rows) > 1 else 1.0, 1.0)
-        )  # room for the widest labels
-    more = {"metric": metric} if style == "map" else {}
-    for k, component in enumerate(panels):
-        tops = [
-            limit_of(r.field.values[component], clim)
-            if has(r.field, component)
-            else None
-            for r in rows
-        ]
-        if same:
-            tops = [max((x for x in tops if x), default=None)] * len(rows)
-        for r, ax, top in zip(rows, axes[:, k], tops):
-            draw(
-                r.field,
-                component,
-                r.gaits,
-                ax=ax,
-                error=r.error,
-                labels=r.labels,
-                clim=top,
-                **more,
-            )
-            for shadow in r.shadows:
-                if solid:
-                    ax.plot(
-                        *shadow.shape(PHASES).T,
-                        ax.get_zlim()[0],
-                        "--",
-                        color="black",
-                        lw=1.0,
-                    )
-                else:
-                    draw_gait(shadow, ax, within=r.field.axes, line="--")
-    say_left_out(
-        fig,
-        panels,
-        components,
-        ccf_name,
-        *([SHADOW] if any(r.shadows for r in rows) else []),
-    )
+        fig, axes = _map_panels(len(panels), len(rows))
+
+    options: dict[str, Any] = {}
     if style == "map":
-        _one_legend(fig, axes, "upper" if fig.get_supxlabel() else "lower")
-    _name(axes, names)
+        options["metric"] = metric
+    for k, component in enumerate(panels):
+        limits = _colour_limits(rows, component, clim, same_scale)
+        for row, ax, limit in zip(rows, axes[:, k], limits):
+            draw(
+                row.field,
+                component,
+                row.gaits,
+                ax=ax,
+                error=row.error,
+                labels=row.labels,
+                clim=limit,
+                **options,
+            )
+            for shadow in row.shadows:
+                _draw_shadow(shadow, ax, row.field, is_surface)
+
+    notes = []
+    if any(row.shadows for row in rows):
+        notes.append(SHADOW)
+    note_zero_components(fig, panels, components, ccf_name, *notes)
+    if style == "map":
+        _merge_legends(fig, axes)
+    _name_rows(axes, names)
     return fig
 
 
-def _one_legend(fig, axes, where: str) -> None:
-    """Put the legends of maps, which explain the same, into one, "upper" or "lower"."""
+def _surface_panels(columns: int, rows: int) -> tuple[Any, Any]:
+    """Return (Figure, 3-D Axes) of surfaces."""
+    fig = blank(1.0 + 3.6 * columns, 3.6 * rows)
+    solid = {"projection": "3d"}
+    axes = fig.subplots(rows, columns, squeeze=False, subplot_kw=solid)
+    fig.get_layout_engine().set(w_pad=0.25)
+    return fig, axes
+
+
+def _map_panels(columns: int, rows: int) -> tuple[Any, Any]:
+    """Return (Figure, Axes) of maps."""
+    width = 0.3 + 3.5 * columns
+    height = 3.2 + 2.75 * (rows - 1)
+    fig, axes = figure(width, height, columns, rows, layout="compressed")
+    # The widest labels of several rows need a margin.
+    right = 0.97 if rows > 1 else 1.0
+    fig.get_layout_engine().set(rect=(0.0, 0.0, right, 1.0))
+    return fig, axes
+
+
+def _colour_limits(
+    rows: Sequence[MapRow],
+    component: int,
+    clim: float | str | None,
+    same_scale: bool,
+) -> list[float | None]:
+    """Return the limit of the colours of each row's map; None where it is zero."""
+    limits: list[float | None] = []
+    for row in rows:
+        if has_component(row.field, component):
+            limits.append(scale_limit(row.field.values[component], clim))
+        else:
+            limits.append(None)
+    if same_scale:
+        highest = max((x for x in limits if x), default=None)
+        return [highest] * len(rows)
+    return limits
+
+
+def _draw_shadow(gait: ProjectedGait, ax: Any, field: Field, is_surface: bool) -> None:
+    """Draw a gait that leaves the plane, as seen along the fixed joints."""
+    if is_surface:
+        floor = ax.get_zlim()[0]
+        ax.plot(*gait.shape(PHASES).T, floor, "--", color="black", lw=1.0)
+    else:
+        draw_gait(gait, ax, within=field.axes, line="--")
+
+
+def _merge_legends(fig: Figure, axes: Any) -> None:
+    """Replace the legends of maps, which explain the same, by one: below the maps, or
+    above them where there is a note below."""
     handles = {}
     for ax in axes.flat:
-        if (legend := ax.get_legend()) is not None:
+        legend = ax.get_legend()
+        if legend is not None:
             handles |= {h.get_label(): h for h in legend.legend_handles}
             legend.remove()
     if handles:
+        side = "upper" if fig.get_supxlabel() else "lower"
         fig.legend(
             handles=[*handles.values()],
-            loc=f"outside {where} center",
+            loc=f"outside {side} center",
             ncols=len(handles),
         )
 
 
-def _name(axes, names: Sequence[str]) -> None:
-    """Write the frame of each row at its left."""
+def _name_rows(axes: Any, names: Sequence[str]) -> None:
+    """Write the name of each row at its left."""
     for row, name in zip(axes, names):
-        options = {
-            "transform": row[0].transAxes,
+        ax = row[0]
+        look = {
+            "transform": ax.transAxes,
             "rotation": 90,
             "ha": "center",
             "va": "center",
             "fontsize": 10,
         }
-        write = row[0].text2D if hasattr(row[0], "text2D") else row[0].text
-        write(
-            -0.33 if write.__name__ == "text" else 0.03,
-            0.5,
-            name,
-            in_layout=write.__name__ == "text",
-            **options,
-        )
+        if hasattr(ax, "text2D"):
+            ax.text2D(0.03, 0.5, name, in_layout=False, **look)
+        else:
+            ax.text(-0.33, 0.5, name, in_layout=True, **look)

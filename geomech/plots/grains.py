@@ -1,4 +1,4 @@
-"""A swim in a bed of grains beside what the tiers predict."""
+"""A swim in a bed of grains, compared with what the tiers predict."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-OF_TIERS, OF_GRAINS = "0.6", "#D55E00"  # colours
+TIER_COLOUR = "0.6"
+GRAINS_COLOUR = "#D55E00"
 
 
 @styled
@@ -28,19 +29,23 @@ def grains_figure(result: Result) -> Figure:
 
 
 def _draw_track(ax: Axes, result: Result) -> None:
+    """Draw the track of the frame and the body at the start of every cycle."""
     ax.plot(result["track_x"].values, result["track_y"].values, color="0.5", lw=0.6)
-    x, y = result["body_x"].values, result["body_y"].values
+    x = result["body_x"].values
+    y = result["body_y"].values
     for k in range(len(x)):
-        alpha = 0.3 + 0.7 * k / len(x)  # later ones are darker
+        alpha = 0.3 + 0.7 * k / len(x)  # later cycles are darker
         ax.plot(x[k], y[k], color="black", lw=1.2, alpha=alpha)
     ax.set(xlabel="$x$ (BL)", ylabel="$y$ (BL)", aspect="equal")
 
 
 def _draw_distances(ax: Axes, result: Result) -> None:
+    """Draw a bar for each tier and one for the grains, with errors; the grains are the
+    last method of a result."""
     names = result["method"].values.tolist()
     distance = result["net_distance"]
     error = np.hypot(np.nan_to_num(distance.error), np.nan_to_num(distance.spread))
-    colours = [OF_TIERS] * (len(names) - 1) + [OF_GRAINS]
+    colours = [TIER_COLOUR] * (len(names) - 1) + [GRAINS_COLOUR]
     rows = range(len(names))
     ax.barh(rows, distance.values, xerr=error, color=colours, height=0.6)
     ax.set_yticks(rows, names)

@@ -3,14 +3,20 @@ panels and as a strip of pictures for a page."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from geomech.core.variables import Result
 from geomech.geometry.field import Field
-from geomech.plots.maps import ccf_map, draw_gait, has, shape_space
+from geomech.plots.maps import (
+    ccf_map,
+    draw_colours,
+    draw_gait,
+    has_component,
+    shape_space,
+)
 from geomech.plots.style import blank, figure, quantity, styled
 from geomech.results.fields import field_of
 from geomech.results.scenes import scene_of
@@ -20,26 +26,37 @@ from geomech.studies.tables import poses
 from geomech.systems.base import body_size, length_unit, shape_labels
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-BODY, HEAD = "#1b4965", "#d1495b"
-LINES = 8  # shape variables beyond which they are a map along the body, not a line each
-MOST_JOINTS = 12  # links beyond which their joints are not marked
-STRIP = 6  # pictures of a strip
-MAP = 2.4  # in, height of a map with its labels
-ROOM = 0.06  # of the larger side, left around what moves
+BODY = "#1b4965"  # colour
+HEAD = "#d1495b"  # colour of the head, its track and the present shape
+LINES = 8  # shape variables that are drawn as curves; more as a map along the body
+MARKED_LINKS = 12  # of the longest chain whose joints are marked
+STRIP_PICTURES = 6
+MAP_HEIGHT = 2.4  # in, with labels
+MARGIN = 0.06  # of the larger side, around everything that moves
+
+# Moves artists to a row of a motion and returns them.
+Update = Callable[[int], tuple]
 
 
-def reach(motion: Motion, rows) -> tuple[np.ndarray, np.ndarray]:
-    """Return (lowest, highest) x and y of all that is seen in these rows, with a margin."""
-    places = [motion.pose[:, :2], _bodies(motion, rows).reshape(-1, 2)]
-    low, high = np.concatenate(places).min(0), np.concatenate(places).max(0)
-    room = ROOM * max(*(high - low), 1e-9 * body_size(motion.scene.system))
-    return low - room, high + room
+# The world
 
 
-def _bodies(motion: Motion, rows) -> np.ndarray:
-    """Return the links' ends (rows, points, 2), or an arrow's tail and head for a system without a body."""
+def world_limits(motion: Motion, rows: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest and highest (x, y) of the track and of the body at these rows,
+    with a margin."""
+    points = [motion.pose[:, :2], _bodies(motion, rows).reshape(-1, 2)]
+    low = np.concatenate(points).min(0)
+    high = np.concatenate(points).max(0)
+    margin = MARGIN * max(*(high - low), 1e-9 * body_size(motion.scene.system))
+    return low - margin, high + margin
+
+
+def _bodies(motion: Motion, rows: Any) -> np.ndarray:
+    """Return the ends of the links (rows, points, 2), or tail and head of an arrow for
+    a system without a body."""
     points = motion.points(rows)
     if points is not None:
         return points
@@ -48,10 +65,13 @@ def _bodies(motion: Motion, rows) -> np.ndarray:
     return np.stack([x + np.cos(theta) * along, y + np.sin(theta) * along], -1)
 
 
-def world(ax, motion: Motion, rows, limits=None) -> Callable:
-    """Draw the track of the frame's origin to the scale of the body; return a function that draws the body at a row and
-    returns the artists that it moved."""
-    low, high = reach(motion, rows) if limits is None else limits
+def draw_world(ax: Axes, motion: Motion, rows: Any, limits: Any = None) -> Update:
+    """Draw the track of the frame's origin to the scale of the body; return a function
+    that draws the body at a row and returns the artists that it moved.
+
+    rows: of all pictures, which fit into the axes. limits: of the axes,
+    as from `world_limits`."""
+    low, high = limits or world_limits(motion, rows)
     unit = length_unit(motion.scene.system)
     ax.set(
         xlabel=f"x ({unit})",
@@ -62,119 +82,126 @@ def world(ax, motion: Motion, rows, limits=None) -> Callable:
     )
     ax.plot(*motion.pose[:, :2].T, color="0.6", lw=0.6)
     (track,) = ax.plot([], [], color=HEAD, lw=1.0, zorder=3)
-    few = (
-        motion.points(slice(0, 1)) is not None
-        and motion.points(slice(0, 1)).shape[-2] <= MOST_JOINTS + 1
-    )
-    (body,) = ax.plot(
-        [],
-        [],
-        color=BODY,
-        lw=2.5,
-        solid_capstyle="round",
-        marker="o" if few else "",
-        ms=3,
-        mfc="white",
-        mew=0.8,
-    )
+    marker = "o" if _has_few_links(motion) else ""
+    joints = {"marker": marker, "ms": 3, "mfc": "white", "mew": 0.8}
+    (body,) = ax.plot([], [], color=BODY, lw=2.5, solid_capstyle="round", **joints)
     (head,) = ax.plot([], [], "o", color=HEAD, ms=5)
 
-    def update(row: int):
-        bodies = _bodies(motion, slice(row, row + 1))[0]
+    def update(row: int) -> tuple:
+        points = _bodies(motion, slice(row, row + 1))[0]
         track.set_data(*motion.pose[: row + 1, :2].T)
-        body.set_data(*bodies.T)
-        head.set_data(*bodies[-1:].T)
+        body.set_data(*points.T)
+        head.set_data(*points[-1:].T)
         return track, body, head
 
     return update
 
 
-def shape(
-    ax, motion: Motion, field: Field | None = None, error: Field | None = None
-) -> Callable:
-    """Draw the gait among all shapes: on the map of the CCF along x, or of the first component that exists, or on the bare
-    plane of two shape variables; for more, against phase, a line each for few, a map along the body for many. Return a
-    function as `world` does."""
-    scene, system = motion.scene, motion.scene.system
-    if system.joints == 2:
-        if field is not None:
-            component = next((k for k in range(3) if has(field, k)), 0)
-            ccf_map(
-                field,
-                component,
-                [scene.gait],
-                ax=ax,
-                error=error,
-                labels=shape_labels(system),
-            )
+def _has_few_links(motion: Motion) -> bool:
+    """Return whether the body is a chain of few enough links to mark its joints."""
+    points = motion.points(slice(0, 1))
+    return points is not None and points.shape[-2] <= MARKED_LINKS + 1
+
+
+# Shape space
+
+
+def draw_shapes(
+    ax: Axes, motion: Motion, field: Field | None = None, error: Field | None = None
+) -> Update:
+    """Draw the gait among all shapes; return a function that marks the shape at a row
+    and returns the artists that it moved.
+
+    Two shape variables are drawn as a plane, with the CCF if there is one; more against
+    phase, as curves or as a map along the body.
+
+    field, error: the CCF and its error. Its component along x is drawn, or the first
+    that is not zero."""
+    if motion.scene.system.joints == 2:
+        if field is None:
+            _draw_plane(ax, motion)
         else:
-            draw_gait(scene.gait, ax)
-            low, high = motion.alpha.min(0), motion.alpha.max(0)
-            room = 0.15 * max(high - low) + 1e-9
-            shape_space(
-                ax,
-                [np.array(x) for x in zip(low - room, high + room)],
-                shape_labels(system),
-            )
-        (dot,) = ax.plot([], [], "o", color=HEAD, ms=7, mec="white", mew=0.8)
-        return _moving(
-            dot, lambda row: ([motion.alpha[row, 0]], [motion.alpha[row, 1]])
-        )
+            _draw_ccf(ax, motion, field, error)
+        dot_style = {"ms": 7, "mec": "white", "mew": 0.8}
+        (dot,) = ax.plot([], [], "o", color=HEAD, **dot_style)
+
+        def move_dot(row: int) -> tuple:
+            alpha = motion.alpha[row]
+            dot.set_data([alpha[0]], [alpha[1]])
+            return (dot,)
+
+        return move_dot
+
     turns = motion.phase / (2 * np.pi)
-    once = turns <= 1 + 1e-9
-    ax.set(xlabel="phase (cycles)", xlim=(0, 1))
-    if system.joints <= LINES:
-        for k, (name, _) in enumerate(shape_labels(system)):
-            ax.plot(turns[once], motion.alpha[once, k], label=quantity(name))
-        ax.set_ylabel(quantity("shape variable", shape_labels(system)[0][1]))
-        ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=4)
-    else:
-        _bends(ax, motion, turns[once])
+    _draw_cycle(ax, motion, turns)
     line = ax.axvline(0.0, color=HEAD, lw=1.5)
-    return _moving(line, lambda row: ([turns[row] % 1] * 2, [0, 1]))
+
+    def move_line(row: int) -> tuple:
+        line.set_data([turns[row] % 1] * 2, [0, 1])
+        return (line,)
+
+    return move_line
 
 
-def _bends(ax, motion: Motion, turns) -> None:
-    """Draw the curvature over phase and place along the body: angles between elements over the distance of their centres."""
-    from cmcrameri import cm
+def _draw_ccf(ax: Axes, motion: Motion, field: Field, error: Field | None) -> None:
+    """Draw the map of the CCF with the gait on it."""
+    present = [k for k in range(3) if has_component(field, k)]
+    component = present[0] if present else 0
+    gait = motion.scene.gait
+    labels = shape_labels(motion.scene.system)
+    ccf_map(field, component, [gait], ax=ax, error=error, labels=labels)
 
-    values, name, ends = (
-        motion.alpha[: len(turns)].T,
-        "angle between elements (rad)",
-        motion.points(slice(0, 1)),
-    )
-    place = np.arange(1, len(values) + 1) / (len(values) + 1)
-    if ends is not None and ends.shape[-2] == len(values) + 2:
-        parts = np.hypot(*np.diff(ends[0], axis=0).T)
-        values, place = (
-            values / ((parts[1:] + parts[:-1]) / 2)[:, None],
-            np.cumsum(parts[:-1]) / parts.sum(),
-        )
+
+def _draw_plane(ax: Axes, motion: Motion) -> None:
+    """Draw the gait on the bare plane of two shape variables."""
+    draw_gait(motion.scene.gait, ax)
+    low = motion.alpha.min(0)
+    high = motion.alpha.max(0)
+    margin = 0.15 * max(high - low) + 1e-9
+    axes = np.stack([low - margin, high + margin], -1)
+    shape_space(ax, axes, shape_labels(motion.scene.system))
+
+
+def _draw_cycle(ax: Axes, motion: Motion, turns: np.ndarray) -> None:
+    """Draw the shape variables over one cycle. turns: phase in cycles, at each row."""
+    labels = shape_labels(motion.scene.system)
+    first = turns <= 1 + 1e-9
+    ax.set(xlabel="phase (cycles)", xlim=(0, 1))
+    if motion.scene.system.joints > LINES:
+        _draw_bends(ax, motion, turns[first])
+        return
+    for k, (name, _) in enumerate(labels):
+        ax.plot(turns[first], motion.alpha[first, k], label=quantity(name))
+    ax.set_ylabel(quantity("shape variable", labels[0][1]))
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=4)
+
+
+def _draw_bends(ax: Axes, motion: Motion, turns: np.ndarray) -> None:
+    """Draw a map over phase and place along the body: the curvature, which is the angle
+    between elements over the distance of their centres, or the bare angles where there
+    is no chain of elements."""
+    values = motion.alpha[: len(turns)].T
+    joints = len(values)
+    points = motion.points(slice(0, 1))
+    if points is not None and points.shape[-2] == joints + 2:
+        lengths = np.hypot(*np.diff(points[0], axis=0).T)
+        centre_distances = (lengths[1:] + lengths[:-1]) / 2
+        values = values / centre_distances[:, None]
+        place = np.cumsum(lengths[:-1]) / lengths.sum()
         name = f"curvature (rad/{length_unit(motion.scene.system)})"
+    else:
+        place = np.arange(1, joints + 1) / (joints + 1)
+        name = "angle between elements (rad)"
     top = np.abs(values).max() or 1.0
-    image = ax.pcolormesh(
-        turns,
-        place,
-        values,
-        cmap=cm.vik,
-        vmin=-top,
-        vmax=top,
-        shading="gouraud",
-        rasterized=True,
-    )
+    image = draw_colours(ax, turns, place, values, top, "gouraud")
     ax.figure.colorbar(image, ax=ax, shrink=0.85).set_label(name)
     ax.set(ylabel="place, tail 0 to head 1", ylim=(place[0], place[-1]))
 
 
-def _moving(artist, at: Callable) -> Callable:
-    def update(row: int):
-        artist.set_data(*at(row))
-        return (artist,)
-
-    return update
+# Films and strips
 
 
-def clock(motion: Motion, row: int) -> str:
+def time_text(motion: Motion, row: int) -> str:
     """Return the time at a row, or its cycle where the gait has no frequency."""
     if motion.time is not None:
         return f"t = {motion.time[row]:.3g} s"
@@ -182,7 +209,7 @@ def clock(motion: Motion, row: int) -> str:
 
 
 def motion_of(result: Result) -> Motion:
-    """Return the motion that a result is of."""
+    """Return the motion of a scene from its result."""
     scene = scene_of(result)
     names = angles_of(range(scene.system.joints))
     alpha = np.stack([result[name].values for name in names], -1)
@@ -190,8 +217,9 @@ def motion_of(result: Result) -> Motion:
     return Motion(scene, result["phase"].values, alpha, poses(result), frequency)
 
 
-def map_of(result: Result) -> tuple[Field | None, Field | None]:
-    """Return the CCF beside a motion, and its error; None without one."""
+def ccf_of(result: Result) -> tuple[Field | None, Field | None]:
+    """Return the CCF of a motion's result and its error, or (None, None) without
+    one."""
     if "ccf" not in result:
         return None, None
     return field_of(result, "ccf")
@@ -199,33 +227,34 @@ def map_of(result: Result) -> tuple[Field | None, Field | None]:
 
 @styled
 def stage(result: Result, rows: Any, caption: str = "") -> Any:
-    """Return (Figure, function that moves its artists to a row and returns them): the
-    world next to the shapes.
+    """Return (Figure, function that moves its artists to a row and returns them), with
+    the body on its track next to its shape among all shapes.
 
-    result: of `geomech.trajectory`. caption: of the film, such as its speed."""
+    result: of `geomech.trajectory`. rows: of all pictures of the film. caption: of the
+    film, such as its speed."""
     motion = motion_of(result)
     fig, axes = figure(8.0, 3.6, 2, width_ratios=[1.25, 1.0])
     track_ax, shape_ax = axes[0]
     if motion.scene.system.joints != 2:
         shape_ax.set_box_aspect(0.8)
-    move_body = world(track_ax, motion, rows)
-    move_shape = shape(shape_ax, motion, *map_of(result))
+    move_body = draw_world(track_ax, motion, rows)
+    move_shape = draw_shapes(shape_ax, motion, *ccf_of(result))
     text = track_ax.set_title("", loc="left")
     track_ax.set_title(caption, loc="right", color="0.3")
 
     def update(row: int) -> tuple:
-        text.set_text(clock(motion, row))
+        text.set_text(time_text(motion, row))
         return *move_body(row), *move_shape(row), text
 
     return fig, update
 
 
 @styled
-def filmstrip(result: Result, pictures: int = STRIP) -> Figure:
-    """Draw the body at some phases, equally spaced from start to end and to one scale, and
-    its shapes in a panel next to them, with the same numbers.
+def filmstrip(result: Result, pictures: int = STRIP_PICTURES) -> Figure:
+    """Draw the body at some phases, equally spaced from start to end and to one scale,
+    and its shapes in a panel next to them, with the same numbers.
 
-    result: of `geomech.trajectory`; the panel is a map of the CCF where it has that.
+    result: of `geomech.trajectory`; with a CCF, the panel is a map of it.
 
     Examples
     --------
@@ -235,60 +264,75 @@ def filmstrip(result: Result, pictures: int = STRIP) -> Figure:
     """
     motion = motion_of(result)
     rows = np.linspace(0, len(motion.phase) - 1, pictures).round().astype(int)
-    low, high = limits = reach(motion, rows)
-    tall = max((high - low)[1] / (high - low)[0], 0.12)  # of a picture, for its width
-    columns = min(pictures, max(1, round(1.2 * np.sqrt(tall * pictures))))
-    lines = -(-pictures // columns)
-    room = lines * (tall * (3.9 / columns - 0.15) + 0.3) + 0.45
-    height = float(np.clip(room, MAP, 8.0))
-    fig = blank(7.2, height)
-    strip_cell, shape_cell = fig.add_gridspec(1, 2, width_ratios=[4.2, 3.0])
-    axes = strip_cell.subgridspec(lines, columns).subplots(
-        squeeze=False, sharex=True, sharey=True
-    )
-    for ax in axes.flat[pictures:]:
-        ax.remove()
-    for k, (ax, row) in enumerate(zip(axes.flat, rows)):
-        world(ax, motion, rows, limits)(row)
-        ax.set_title(rf"$\bf{{{k + 1}}}$  {clock(motion, row)}", loc="left", fontsize=8)
+    limits = world_limits(motion, rows)
+    fig, axes, panel = _strip_panels(pictures, *limits)
+    for k, row in enumerate(rows):
+        ax = axes[k]
+        draw_world(ax, motion, rows, limits)(row)
+        title = rf"$\bf{{{k + 1}}}$  {time_text(motion, row)}"
+        ax.set_title(title, loc="left", fontsize=8)
         ax.label_outer()
-    around = max(1e-3, (height - MAP) / 2)
-    panel = fig.add_subplot(
-        shape_cell.subgridspec(3, 1, height_ratios=[around, MAP, around])[1]
-    )
-    shape(panel, motion, *map_of(result))
-    _numbers(panel, motion, rows)
+    draw_shapes(panel, motion, *ccf_of(result))
+    if motion.scene.system.joints == 2:
+        _number_shapes(panel, motion, rows)
+    else:
+        _number_phases(panel, motion, rows)
     return fig
 
 
-def _numbers(ax, motion: Motion, rows) -> None:
-    """Write the pictures' numbers at their shapes; numbers of one shape stand in one text."""
-    numbers: dict[tuple, list[str]] = {}
-    for k, row in enumerate(rows):
-        turn = float(motion.phase[row] / (2 * np.pi) % 1)
-        at = (
-            tuple(np.round(motion.alpha[row], 9))
-            if motion.scene.system.joints == 2
-            else (round(turn, 9),)
-        )
-        numbers.setdefault(at, []).append(str(k + 1))
+def _strip_panels(
+    pictures: int, low: np.ndarray, high: np.ndarray
+) -> tuple[Any, list, Any]:
+    """Return (Figure, Axes of the pictures, Axes of the shapes), in a height that fits
+    pictures from ``low`` to ``high`` (2,)."""
+    width, height = high - low
+    aspect = max(height / width, 0.12)
+    columns = min(pictures, max(1, round(1.2 * np.sqrt(aspect * pictures))))
+    lines = -(-pictures // columns)
+    strip_height = lines * (aspect * (3.9 / columns - 0.15) + 0.3) + 0.45
+    fig_height = float(np.clip(strip_height, MAP_HEIGHT, 8.0))
+    fig = blank(7.2, fig_height)
+    strip_cell, shape_cell = fig.add_gridspec(1, 2, width_ratios=[4.2, 3.0])
+    grid = strip_cell.subgridspec(lines, columns)
+    axes = grid.subplots(squeeze=False, sharex=True, sharey=True)
+    for ax in axes.flat[pictures:]:
+        ax.remove()
+    around = max(1e-3, (fig_height - MAP_HEIGHT) / 2)
+    cells = shape_cell.subgridspec(3, 1, height_ratios=[around, MAP_HEIGHT, around])
+    return fig, list(axes.flat[:pictures]), fig.add_subplot(cells[1])
+
+
+def _number_shapes(ax: Axes, motion: Motion, rows: np.ndarray) -> None:
+    """Write the pictures' numbers at their shapes on the plane, away from its
+    middle."""
+    shapes = [tuple(np.round(motion.alpha[row], 9)) for row in rows]
     middle = motion.alpha.mean(0)
-    for at, texts in numbers.items():
-        if len(at) == 2:
-            ax.plot(*at, "o", color=HEAD, ms=6, mec="white", mew=0.8)
-            away = np.subtract(at, middle)
-            where = {"xy": at, "xytext": 11 * away / (np.hypot(*away) or 1.0)}
-        else:
-            ax.axvline(at[0], color=HEAD, lw=1.0)
-            where = {
-                "xy": (at[0], 1.0),
-                "xycoords": ("data", "axes fraction"),
-                "xytext": (0, 6),
-            }
-        style = {
-            "textcoords": "offset points",
-            "ha": "center",
-            "va": "center",
-            "weight": "bold",
-        }
-        ax.annotate(",".join(texts), **where, **style)
+    for shape, text in _numbers_by_place(shapes).items():
+        ax.plot(*shape, "o", color=HEAD, ms=6, mec="white", mew=0.8)
+        away = np.subtract(shape, middle)
+        offset = 11 * away / (np.hypot(*away) or 1.0)
+        _write_number(ax, text, shape, offset)
+
+
+def _number_phases(ax: Axes, motion: Motion, rows: np.ndarray) -> None:
+    """Write the pictures' numbers above lines at their phases."""
+    turns = [round(float(motion.phase[row] / (2 * np.pi) % 1), 9) for row in rows]
+    for turn, text in _numbers_by_place(turns).items():
+        ax.axvline(turn, color=HEAD, lw=1.0)
+        _write_number(ax, text, (turn, 1.0), (0, 6), xycoords=("data", "axes fraction"))
+
+
+def _numbers_by_place(places: Sequence) -> dict[Any, str]:
+    """Return the numbers of pictures, from 1, by their place; those of one place are
+    joined by commas."""
+    numbers: dict[Any, list[str]] = {}
+    for k, place in enumerate(places):
+        numbers.setdefault(place, []).append(str(k + 1))
+    return {place: ",".join(texts) for place, texts in numbers.items()}
+
+
+def _write_number(ax: Axes, text: str, point: Any, offset: Any, **options: Any) -> None:
+    """Write a number next to a point. offset: in points of the page."""
+    look = {"ha": "center", "va": "center", "weight": "bold"}
+    place = {"xytext": offset, "textcoords": "offset points"}
+    ax.annotate(text, point, **place, **look, **options)

@@ -1,4 +1,5 @@
-"""Pictures of accuracy studies: error against seconds, or against values of settings."""
+"""Pictures of accuracy studies: error against seconds, or against values of
+settings."""
 
 from __future__ import annotations
 
@@ -36,19 +37,22 @@ PANELS = {
         "rms distance from where the setting leads (BL)",
     ),
 }
-OF_ROBOTS = {
+ROBOT_SETTINGS = {  # labels of axes
     "steps": "steps of a cycle",
     "elements": "elements of an outline",
     "rounding": "rounding (m/s)",
 }
-FLAT = 0.3  # order below which finer settings gain nothing to speak of
-LEAST = 1e-17  # stands for an error of 0 on an axis of logarithms
-LEAST_SPEED = 1e-12  # the same of a speed, m/s
+LOWEST_ORDER = 0.3  # below it finer settings are said to gain nothing; assumed
+SMALLEST_ERROR = 1e-17  # drawn in place of 0 on a logarithmic axis
+SMALLEST_SPEED_ERROR = 1e-12  # m/s, likewise
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A setting of a study, from coarse to fine: its values, seconds and errors."""
+    """A setting that a study varied from coarse to fine.
+
+    varied: its name. tier: that it belongs to, or "". values, seconds, error: of each
+    run (N,). order: measured order of convergence, nan if unknown."""
 
     varied: str
     tier: str
@@ -59,10 +63,11 @@ class Line:
     order_by_theory: str
 
 
-def lines_of(result: Result, name: str = "error", against: str = "") -> list[Line]:
-    """Return the settings of a study with an error of that name; ``against`` the truth or
-    a limit alone, or all."""
-    found = []
+def study_lines(result: Result, name: str = "error", against: str = "") -> list[Line]:
+    """Return the settings of a study with the error of a name.
+
+    against: only errors against "truth" or "limit" (PANELS); by default all."""
+    lines = []
     for k, reference in enumerate(result["against"].values.tolist()):
         if against and reference != against:
             continue
@@ -70,7 +75,7 @@ def lines_of(result: Result, name: str = "error", against: str = "") -> list[Lin
         if "tier" in result:
             tier = str(result["tier"][k])
         is_run = np.isfinite(result["value"][k])
-        found.append(
+        lines.append(
             Line(
                 str(result["varied"][k]),
                 tier,
@@ -81,13 +86,15 @@ def lines_of(result: Result, name: str = "error", against: str = "") -> list[Lin
                 str(result["order_by_theory"][k]),
             )
         )
-    return found
+    return lines
 
 
 def accuracy_figure(result: Result) -> Figure:
-    """Draw an accuracy study: error against seconds of every tier and setting of a gait,
-    against numbers of parts and seconds of forces in grains, or against each setting of a
-    robot.
+    """Draw an accuracy study.
+
+    Of a gait it shows error against seconds for every tier and setting, of forces in
+    grains error against the number of parts and against seconds, of a robot error
+    against each setting.
 
     Examples
     --------
@@ -102,12 +109,12 @@ def accuracy_figure(result: Result) -> Figure:
     return tiers_figure(result)
 
 
-# Of a gait
+# Gaits
 
 
 @styled
 def tiers_figure(result: Result) -> Figure:
-    """Draw `work_precision` on a figure of its own."""
+    """Draw `work_precision` on a new figure, with room for its legends."""
     count = len({*result["against"].values.tolist()})
     fig, axes = figure(5.0 * count, 5.2, count)
     work_precision(result, axes[0])
@@ -116,18 +123,19 @@ def tiers_figure(result: Result) -> Figure:
 
 @styled
 def work_precision(result: Result, axes: Any = None) -> Any:
-    """Draw error against seconds of a study of a gait, a line for each setting of a tier
-    with its first and last value at its ends.
+    """Draw error against seconds of a study of a gait, with a line for each setting of
+    a tier and its first and last value at the ends; return the Axes.
 
-    The first of two Axes has the error of the answer, the second the error from the limit
-    of that setting alone. A kind of error that no setting is measured by has no Axes."""
+    axes: one for each kind of error in the study, in the order of PANELS: the error of
+    the answer, and the distance from the limit of the setting alone."""
     panels = [name for name in PANELS if name in result["against"].values.tolist()]
     if axes is None:
-        _, ((*axes,),) = figure(5.0 * len(panels), 3.8, len(panels))
+        _, grid = figure(5.0 * len(panels), 3.8, len(panels))
+        axes = [*grid[0]]
     count = result["amplitude"].values.size
     for ax, against in zip(axes, panels):
         title, error = PANELS[against]
-        for k, line in enumerate(lines_of(result, against=against)):
+        for k, line in enumerate(study_lines(result, against=against)):
             colour = f"C{k}"
             if against == "truth":
                 colour = TIERS[line.tier].colour
@@ -147,42 +155,40 @@ def work_precision(result: Result, axes: Any = None) -> Any:
 
 
 def draw_line(ax: Any, line: Line, marker: str, colour: str) -> None:
-    """Draw error against seconds of a setting, with its values at its ends."""
-    error = np.maximum(line.error, LEAST)
-    about = SETTINGS.get(line.varied, line.varied)
-    label = f"{line.tier}: {about}, {line.values[0]:g} to {line.values[-1]:g}"
-    label += gain_words(line.order)
+    """Draw error against seconds of a setting, with its first and last value at the
+    ends."""
+    error = np.maximum(line.error, SMALLEST_ERROR)
+    setting = SETTINGS.get(line.varied, line.varied)
+    label = f"{line.tier}: {setting}, {line.values[0]:g} to {line.values[-1]:g}"
+    label += order_text(line.order)
     ax.loglog(line.seconds, error, marker=marker, label=label, color=colour, lw=1.0)
-    for end, offset, how in (
-        (0, (0, 5), {"ha": "center"}),
-        (-1, (5, 0), {"ha": "left", "va": "center"}),
-    ):
-        at = {
-            "xy": (line.seconds[end], error[end]),
-            "xytext": offset,
-            "textcoords": "offset points",
-        }
-        ax.annotate(f"{line.values[end]:g}", **at, **how, fontsize=7, color=colour)
+    look = {"textcoords": "offset points", "fontsize": 7, "color": colour}
+    first = (line.seconds[0], error[0])
+    last = (line.seconds[-1], error[-1])
+    ax.annotate(f"{line.values[0]:g}", first, (0, 5), ha="center", **look)
+    ax.annotate(f"{line.values[-1]:g}", last, (5, 0), va="center", **look)
 
 
-def gain_words(order: float) -> str:
+def order_text(order: float) -> str:
+    """Return what a legend adds about the order of convergence."""
     if np.isnan(order):
         return ""
-    if order >= FLAT:
+    if order >= LOWEST_ORDER:
         return f", order {order:.1f}"
     return ", no gain"
 
 
 def show_decades(axis: Any) -> None:
-    """Label powers of ten alone, two of them at least."""
+    """Label only powers of ten on a logarithmic axis, and at least two of them."""
     low, high = axis.get_view_interval()
     if np.floor(np.log10(high)) - np.ceil(np.log10(low)) < 1:
-        ends = 10.0 ** np.floor(np.log10(low)), 10.0 ** np.ceil(np.log10(high))
-        axis.axes.set(**{f"{axis.axis_name}lim": ends})
+        lowest = 10.0 ** np.floor(np.log10(low))
+        highest = 10.0 ** np.ceil(np.log10(high))
+        axis.axes.set(**{f"{axis.axis_name}lim": (lowest, highest)})
     axis.set_minor_formatter("")
 
 
-# Of forces in grains
+# Forces in grains
 
 
 @styled
@@ -192,13 +198,14 @@ def parts_figure(result: Result) -> Figure:
     fig, ((by_parts, by_seconds),) = figure(7.2, 3.2, 2)
     facts = result.attributes
     for name, colour, marker in zip(("force", "moment"), ("C0", "0.2"), "os"):
-        (line,) = lines_of(result, f"{name}_error")
+        (line,) = study_lines(result, f"{name}_error")
         label = name
         if not np.isnan(line.order):
             label = f"{name}, order {line.order:.1f}"
-        error = np.maximum(line.error, LEAST)
-        for ax, at in ((by_parts, line.values), (by_seconds, line.seconds)):
-            ax.loglog(at, error, color=colour, marker=marker, lw=1.0, label=label)
+        error = np.maximum(line.error, SMALLEST_ERROR)
+        look = {"color": colour, "marker": marker, "lw": 1.0, "label": label}
+        by_parts.loglog(line.values, error, **look)
+        by_seconds.loglog(line.seconds, error, **look)
     by_parts.set_xlabel(facts["parts"])
     by_seconds.set_xlabel(f"seconds for {facts['poses']} poses")
     for ax in (by_parts, by_seconds):
@@ -211,25 +218,26 @@ def parts_figure(result: Result) -> Figure:
     return fig
 
 
-# Of a robot
+# Robots
 
 
 @styled
 def robot_figure(result: Result) -> Figure:
-    """Draw the error of the speed against each setting of a robot, beside the order of
-    theory."""
-    lines = lines_of(result)
+    """Draw the error of the speed against each setting of a robot, with a dashed line
+    of the order that theory predicts."""
+    lines = study_lines(result)
     fig, axes = figure(8.4, 2.9, len(lines))
     for ax, line in zip(axes[0], lines):
-        error = np.maximum(line.error, LEAST_SPEED)
+        error = np.maximum(line.error, SMALLEST_SPEED_ERROR)
         ax.loglog(line.values, error, "o-", color="black", lw=1.0)
         power = -float(line.order_by_theory)
-        if line.varied == "rounding":  # which is finer where it is less
+        if line.varied == "rounding":
+            # A smaller rounding is finer; other settings are numbers of parts.
             power = -power
         theory = error.max() * (line.values / line.values[error.argmax()]) ** power
         label = f"order {line.order_by_theory}"
         ax.loglog(line.values, theory, color="0.6", ls="--", lw=0.8, label=label)
-        ax.set(xlabel=OF_ROBOTS[line.varied], ylabel="error of the speed (m/s)")
+        ax.set(xlabel=ROBOT_SETTINGS[line.varied], ylabel="error of the speed (m/s)")
         ax.set_xticks(line.values, [f"{v:g}" for v in line.values], rotation=45)
         ax.minorticks_off()
         ax.legend(loc="best")

@@ -7,11 +7,11 @@ import io
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-DPI = 110
+DPI = 110  # of pictures in notebooks
 
 
 class ShownFigure(Figure):
-    """A Figure that a notebook shows if a cell ends with it."""
+    """A Figure that a notebook shows if it is the last value of a cell."""
 
     def _repr_png_(self) -> bytes:
         with io.BytesIO() as file:
@@ -20,15 +20,15 @@ class ShownFigure(Figure):
 
 
 class ShownAxes(Axes):
-    """Axes whose figure a notebook shows if a cell ends with them."""
+    """Axes whose figure a notebook shows if they are the last value of a cell."""
 
     def _repr_png_(self) -> bytes:
         return self.get_figure(root=True)._repr_png_()
 
     def _update_title_position(self, renderer) -> None:
-        """Place titles only where there are any: matplotlib measures all ticks for it, a tenth of a drawing."""
-        if any(
-            title.get_text()
-            for title in (self.title, self._left_title, self._right_title)
-        ):
+        """Place titles only where there are any.
+
+        matplotlib measures all ticks for it, which takes a tenth of a drawing."""
+        titles = (self.title, self._left_title, self._right_title)
+        if any(title.get_text() for title in titles):
             super()._update_title_position(renderer)

@@ -1,4 +1,5 @@
-"""The look of all pictures: the project's style, figures without pyplot's global state, files that appear whole."""
+"""The look of all pictures: the project's style, figures without pyplot's global state,
+files that appear whole."""
 
 from __future__ import annotations
 
@@ -15,13 +16,11 @@ from rft.core.refusal import Refusal
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-GREEK = (
-    "alpha",
-    "gamma",
-    "theta",
-)  # letters that names of shape variables and parameters begin with
-MARKED = 40  # points of a line up to which each has its marker
-SOURCES = {  # what is drawn, by its class
+GREEK = ("alpha", "gamma", "theta")  # first letters of shape variables and parameters
+MARKED = 40  # points of the longest line that has a marker at each
+LEGEND_ENTRY = 2.2  # in, of a figure's width, for an entry of its legend
+MINUS_SIGN = "\N{MINUS SIGN}"
+SOURCES = {  # where a value of each class comes from, for refusals
     "Connection": "a Connection such as study.fitted",
     "Field": "a Field such as study.ccf()",
     "Fitted": "a measured gait, the result of geomech.fit_log",
@@ -30,7 +29,8 @@ SOURCES = {  # what is drawn, by its class
     "Result": "the Result of a question",
     "TwoForm": "a TwoForm such as study.two_form",
 }
-PACKED = 4  # of zlib's nine levels: half the time of the usual six, for files a twentieth larger
+# Of zlib's nine levels: half the time of the usual six, for files a twentieth larger.
+PNG_COMPRESSION = 4
 STYLE = {
     "font.size": 9,
     "axes.labelsize": 9,
@@ -51,7 +51,8 @@ Drawn = TypeVar("Drawn")
 
 
 def styled(draw: Callable[Arguments, Drawn]) -> Callable[Arguments, Drawn]:
-    """Make a drawing function use the project's style, whatever the caller's is, and refuse what it does not draw."""
+    """Return a drawing function that uses the project's style, whatever the caller's
+    is, and refuses a first argument that it does not draw."""
 
     @functools.wraps(draw)
     def in_style(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Drawn:
@@ -74,20 +75,27 @@ def _require_drawn(draw: Callable[..., Any], value: Any) -> None:
 
 @functools.cache
 def _drawn_kind(draw: Callable[..., Any]) -> type | None:
-    """Return the class of the first argument by its annotation; None where several kinds will do."""
+    """Return the class of SOURCES that the first argument is annotated with, or
+    None."""
     first = next(iter(inspect.signature(draw).parameters.values()))
-    try:  # the first alone: others may be of Matplotlib's types, which are imported for type checkers only
+    # Only the first annotation: others may be types of Matplotlib, which are imported
+    # for type checkers alone.
+    try:
         hint = eval(first.annotation, draw.__globals__)
     except (NameError, TypeError):  # an annotation for type checkers alone, or none
         return None
     kind = get_origin(hint) or hint
-    return kind if isinstance(kind, type) and kind.__name__ in SOURCES else None
+    if isinstance(kind, type) and kind.__name__ in SOURCES:
+        return kind
+    return None
 
 
 @styled
 def blank(width: float, height: float, layout: str = "constrained") -> Any:
-    """Return a Figure, sizes in inches, whose Axes are laid out without overlap; "compressed" closes the gaps in a row of
-    maps."""
+    """Return an empty Figure whose Axes will be laid out without overlap.
+
+    width, height: in inches. layout: "constrained", or "compressed", which closes the
+    gaps in a row of maps."""
     from geomech.plots.shown import ShownFigure
 
     fig = ShownFigure(figsize=(width, height), layout=layout)
@@ -104,8 +112,10 @@ def figure(
     layout: str = "constrained",
     **grid: Any,
 ) -> tuple[Any, Any]:
-    """Return (Figure, array of Axes (rows, columns)) as `blank` does; both show in a notebook. ``grid`` as for matplotlib's
-    GridSpec.
+    """Return (Figure, array of Axes (rows, columns)), both of which a notebook shows.
+
+    width, height: in inches. layout: "constrained", or "compressed", which closes the
+    gaps in a row of maps. grid: as for matplotlib's GridSpec.
 
     Examples
     --------
@@ -116,14 +126,17 @@ def figure(
     """
     from geomech.plots.shown import ShownAxes
 
-    fig, subplot = blank(width, height, layout), {"axes_class": ShownAxes}
-    return fig, fig.subplots(
+    fig = blank(width, height, layout)
+    subplot = {"axes_class": ShownAxes}
+    axes = fig.subplots(
         rows, columns, squeeze=False, gridspec_kw=grid, subplot_kw=subplot
     )
+    return fig, axes
 
 
 def quantity(name: str, unit: str = "") -> str:
-    """Return the label of an axis: the name with its unit in brackets, a letter with an index drawn as one.
+    """Return the label of an axis: the name with its unit in brackets, and a letter
+    with an index as a formula.
 
     Examples
     --------
@@ -133,51 +146,55 @@ def quantity(name: str, unit: str = "") -> str:
     """
     letter, _, index = name.partition("_")
     if index.isalnum() and (letter in GREEK or len(letter) == 1):
-        name = (
-            rf"$\{letter}_{{{index}}}$"
-            if letter in GREEK
-            else f"${letter}_{{{index}}}$"
-        )
-    return f"{name} ({unit})" if unit else name
+        if letter in GREEK:
+            letter = rf"\{letter}"
+        name = f"${letter}_{{{index}}}$"
+    if unit:
+        return f"{name} ({unit})"
+    return name
 
 
-ENTRY = 2.2  # in, of the width of a figure for an entry of its legend
+def with_minus_signs(text: str) -> str:
+    """Return a text of numbers with minus signs in place of hyphens."""
+    return text.replace("-", MINUS_SIGN)
 
 
 def shared_legend(fig: Any, place: str = "outside upper center") -> None:
-    """Draw one legend for all panels of a figure, with every label once; above or below them in as many columns as fit."""
-    handles = {
-        label: line
-        for ax in fig.axes
-        for line, label in zip(*ax.get_legend_handles_labels())
-        if label.strip("_")
-    }
-    rows = (
-        len(handles)
-        if "right" in place
-        else -(-len(handles) // max(1, int(fig.get_figwidth() / ENTRY)))
-    )
-    if handles:
-        fig.legend(
-            handles.values(), handles.keys(), loc=place, ncols=-(-len(handles) // rows)
-        )
+    """Draw one legend for all panels of a figure, with every label once.
+
+    place: a location of matplotlib's legends. At the right it has one column, above or
+    below the panels as many as fit."""
+    handles = {}
+    for ax in fig.axes:
+        for line, label in zip(*ax.get_legend_handles_labels()):
+            if label.strip("_"):
+                handles[label] = line
+    if not handles:
+        return
+    columns = 1
+    if "right" not in place:
+        most = max(1, int(fig.get_figwidth() / LEGEND_ENTRY))
+        rows = -(-len(handles) // most)
+        columns = -(-len(handles) // rows)
+    fig.legend(handles.values(), handles.keys(), loc=place, ncols=columns)
 
 
 def axes_of(ax: Any, width: float = 3.4, height: float = 3.0) -> Any:
-    """Return ax; without it pyplot's current Axes, where the caller has a figure of pyplot open, else new ones, of a size in
-    inches, which a notebook shows."""
+    """Return the Axes to draw on: ``ax`` if it is given, else pyplot's current ones if
+    the caller has a figure of pyplot open, else new ones, which a notebook shows.
+
+    width, height: of the new figure, in inches."""
     if ax is not None:
         return ax
     pyplot = sys.modules.get("matplotlib.pyplot")
-    return (
-        pyplot.gca()
-        if pyplot and pyplot.get_fignums()
-        else figure(width, height)[1][0, 0]
-    )
+    if pyplot and pyplot.get_fignums():
+        return pyplot.gca()
+    _, axes = figure(width, height)
+    return axes[0, 0]
 
 
 def check_format(path: str | Path) -> Path:
-    """Return path if its ending is a figure format, else Refusal."""
+    """Return the path if its ending is a format of pictures; else raise Refusal."""
     formats = (".png", ".pdf", ".svg")
     path = Path(path)
     if path.suffix.lower() not in formats:
@@ -189,8 +206,11 @@ def check_format(path: str | Path) -> Path:
 
 @styled
 def save(fig: Figure, *paths: str | Path) -> None:
-    """Write a figure, or that of Axes, to files, each of which appears whole or not at all. The figure is laid out once and
-    drawn once for each file, where `savefig` lays out and draws twice for each.
+    """Write a figure, or the figure of Axes, to files, each of which appears whole or
+    not at all.
+
+    The figure is laid out once and drawn once for each file; `savefig` lays out and
+    draws twice for each.
 
     Examples
     --------
@@ -203,7 +223,9 @@ def save(fig: Figure, *paths: str | Path) -> None:
     True
     """
     fig = getattr(fig, "figure", fig)
-    canvas, engine, dpi = fig.canvas, fig.get_layout_engine(), fig.dpi
+    canvas = fig.canvas
+    engine = fig.get_layout_engine()
+    dpi = fig.dpi
     try:
         for path in map(check_format, paths):
             with atomic_file(path) as part:
@@ -220,7 +242,9 @@ def _print(fig, ending: str, file: Path) -> None:
     if ending == ".png":
         from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-        FigureCanvasAgg(fig).print_png(file, pil_kwargs={"compress_level": PACKED})
+        FigureCanvasAgg(fig).print_png(
+            file, pil_kwargs={"compress_level": PNG_COMPRESSION}
+        )
     elif ending == ".pdf":
         from matplotlib.backends.backend_pdf import FigureCanvasPdf
 

@@ -1,4 +1,5 @@
-"""Other ways to draw a connection and its CCF: streamlines, contours with the gait's area shaded, surfaces."""
+"""Other ways to draw a connection and its CCF: streamlines, contours with the gait's
+area shaded, surfaces."""
 
 from __future__ import annotations
 
@@ -13,6 +14,7 @@ from geomech.geometry.field import Field
 from geomech.plots.maps import (
     ANGLES,
     PHASES,
+    ROW_ROUNDING,
     TITLES,
     Labels,
     arrow_colours,
@@ -21,14 +23,13 @@ from geomech.plots.maps import (
     ccf_name,
     draw_gait,
     drawable,
-    finer,
     label_row,
-    limit_of,
+    refined,
+    scale_limit,
     shape_space,
-    unit_of,
     vector_field,
 )
-from geomech.plots.style import axes_of, quantity, styled
+from geomech.plots.style import axes_of, blank, quantity, styled, with_minus_signs
 from rft.core.registry import Registry, functions_with
 
 if TYPE_CHECKING:
@@ -45,29 +46,35 @@ CCF_STYLES = Registry(
 )
 CONNECTION_STYLES.register(vector_field, style="quiver")
 CCF_STYLES.register(ccf_map, style="map")
-LINES = 61  # points an axis that streamlines are drawn on
-LEVELS = 6  # contours of either sign
-AREA = 240  # points an axis on which a gait's area is shaded
-MINUS_SIGN = "\N{MINUS SIGN}"
-DIRECTIONS = (
+
+STREAM_POINTS = 61  # along an axis, at most: the grid that streamlines are drawn on
+CONTOURS = 6  # of either sign
+AREA_POINTS = 240  # along an axis: the grid on which a gait's area is shaded
+PLUS = "#B2182B"  # areas that move the body forwards, to the left or turn it left
+MINUS = "#2166AC"  # areas that move it the opposite way
+DIRECTIONS = (  # of PLUS and MINUS, by component
     ("ahead", "backwards"),
     ("to the left", "to the right"),
     ("turns left", "turns right"),
 )
-PLUS, MINUS = (
-    "#B2182B",
-    "#2166AC",
-)  # of areas that carry forwards and backwards, or to either side
 
 
 @CONNECTION_STYLES.register(style="streamlines")
 @styled
 def streamlines(
-    connection: Connection, component: int = 0, *, ax: Axes | None = None, labels: Labels = ANGLES,
-    top: float | None = None, clim: float | str | None = None,
-) -> Axes:  # fmt: skip
-    """Draw row ``component`` of A as streamlines over shape space: along them a change of shape moves the body the most for
-    its size, across them not at all. Colour: length of the row. Other arguments as for `vector_field`.
+    connection: Connection,
+    component: int = 0,
+    *,
+    ax: Axes | None = None,
+    labels: Labels = ANGLES,
+    top: float | None = None,
+    clim: float | str | None = None,
+) -> Axes:
+    """Draw row ``component`` of A as streamlines over shape space, coloured by the
+    row's length.
+
+    Along a line a change of shape moves the body the most for its size, across it not
+    at all. Arguments as for `vector_field`.
 
     Examples
     --------
@@ -78,45 +85,59 @@ def streamlines(
     from matplotlib.colors import Normalize
 
     ax = axes_of(ax)
-    axes = [np.linspace(a[0], a[-1], min(LINES, 4 * len(a))) for a in connection.axes]
     row = Field(connection.axes, connection.A[component], connection.degree)
     if row.masked:
-        axes, values = list(connection.axes), row.values
+        axes = list(connection.axes)
+        u, v = row.values
     else:
-        values = np.moveaxis(
-            row(np.stack(np.meshgrid(*axes, indexing="ij"), -1)), -1, 0
-        )
-    even = [
-        np.linspace(a[0], a[-1], len(a)) for a in axes
-    ]  # to the last digit, as streamplot asks
-    u, v = values
-    size = np.hypot(u, v)
-    most = top or limit_of(size, clim)
-    if np.nanmax(size, initial=0.0) <= 1e-13 * np.nanmax(
-        np.abs(connection.A), initial=0.0
-    ):
-        u, v, size = 0 * u, 0 * v, 0 * size
-    look = {
-        "cmap": arrow_colours(),
-        "norm": Normalize(0.0, most),
-        "density": 1.1,
-        "linewidth": 0.9,
-        "arrowsize": 0.8,
-    }
-    lines = ax.streamplot(*even, u.T, v.T, color=np.nan_to_num(size.T), **look)
-    return label_row(ax, lines.lines, component, connection, labels, size)
+        axes = [
+            np.linspace(a[0], a[-1], min(STREAM_POINTS, 4 * len(a)))
+            for a in connection.axes
+        ]
+        shapes = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
+        u, v = np.moveaxis(row(shapes), -1, 0)
+    lengths = np.hypot(u, v)
+    top = top or scale_limit(lengths, clim)
+    largest_entry = np.nanmax(np.abs(connection.A), initial=0.0)
+    if np.nanmax(lengths, initial=0.0) <= ROW_ROUNDING * largest_entry:
+        u = 0 * u
+        v = 0 * v
+        lengths = 0 * lengths
+
+    # streamplot refuses spacing that differs in its last digit.
+    even = [np.linspace(a[0], a[-1], len(a)) for a in axes]
+    lines = ax.streamplot(
+        *even,
+        u.T,
+        v.T,
+        color=np.nan_to_num(lengths.T),
+        cmap=arrow_colours(),
+        norm=Normalize(0.0, top),
+        density=1.1,
+        linewidth=0.9,
+        arrowsize=0.8,
+    )
+    return label_row(ax, lines.lines, component, connection, labels, lengths)
 
 
 @CCF_STYLES.register(style="contours")
 @styled
 def ccf_contours(
-    field: Field, component: int = 0, gaits: Sequence[Gait] = (), *, ax: Axes | None = None, error: Field | None = None,
-    labels: Labels = ANGLES, clim: float | str | None = None,
-) -> Axes:  # fmt: skip
-    """Draw a component of the CCF as contours, dashed below zero, and shade the area of each gait by the sign of its
-    contribution to the displacement: CCF times winding number.
+    field: Field,
+    component: int = 0,
+    gaits: Sequence[Gait] = (),
+    *,
+    ax: Axes | None = None,
+    error: Field | None = None,
+    labels: Labels = ANGLES,
+    clim: float | str | None = None,
+) -> Axes:
+    """Draw a component of the CCF as contours, dashed below zero, and shade the area of
+    each gait by the sign of its contribution to the displacement: CCF times winding
+    number.
 
-    error: shapes where it exceeds the value have no shade. Other arguments as for `ccf_map`.
+    error: of the field; shapes where it exceeds the value are not shaded. Other
+    arguments as for `ccf_map`.
 
     Examples
     --------
@@ -124,18 +145,39 @@ def ccf_contours(
     >>> study = geomech.study("three-link-viscous", grid=15).tables
     >>> ax = geomech.plots.ccf_contours(study.curvature, 0)
     """
+    ax = axes_of(ax)
+    field = drawable(field)
+    axes, values = refined(field, field.values[component])
+    _draw_contours(ax, axes, values, scale_limit(values, clim))
+    shape_space(ax, field.axes, labels)
+    signs = set()
+    for gait in gaits:
+        signs |= _shade_area(ax, field, component, gait, error)
+        draw_gait(gait, ax, within=field.axes)
+    if signs:
+        _sign_legend(ax, component, signs, -0.2)
+    ax.set_title(f"{ccf_label(component, field.unit, labels)}: {TITLES[component]}")
+    return ax
+
+
+def _draw_contours(
+    ax: Axes, axes: Sequence[np.ndarray], values: np.ndarray, limit: float
+) -> None:
+    """Draw contours at round values between -limit and limit, every second one with its
+    value."""
     from matplotlib.ticker import MaxNLocator
 
-    ax, field = axes_of(ax), drawable(field)
-    axes, values = finer(field, field.values[component])
-    most = limit_of(values, clim)
-    levels = MaxNLocator(
-        2 * LEVELS, steps=[1, 2, 2.5, 5, 10], symmetric=True
-    ).tick_values(-most, most)
-    looks = {0: ("0.6", 1.4, "-"), 1: ("0.25", 0.6, "-"), -1: ("0.25", 0.6, "--")}
-    colours, widths, dashes = zip(
-        *(looks[int(np.sign(x)) if abs(x) > 1e-9 * most else 0] for x in levels)
-    )
+    steps = [1, 2, 2.5, 5, 10]
+    ticks = MaxNLocator(2 * CONTOURS, steps=steps, symmetric=True)
+    levels = ticks.tick_values(-limit, limit)
+    colours = []
+    widths = []
+    dashes = []
+    for level in levels:
+        is_zero = abs(level) <= 1e-9 * limit
+        colours.append("0.6" if is_zero else "0.25")
+        widths.append(1.4 if is_zero else 0.6)
+        dashes.append("--" if level < 0 and not is_zero else "-")
     lines = ax.contour(
         *axes,
         values.T,
@@ -144,164 +186,172 @@ def ccf_contours(
         linewidths=widths,
         linestyles=dashes,
     )
-    ax.clabel(
-        lines, levels[::2], fmt=lambda x: f"{x:g}".replace("-", MINUS_SIGN), fontsize=6
-    )
-    shape_space(ax, field.axes, labels)
-    signs = set()
-    for gait in gaits:
-        signs |= _shaded(ax, field, component, gait, error)
-        draw_gait(gait, ax, within=field.axes)
-    if signs:
-        ax.legend(
-            handles=_legend_patches(component, signs),
-            loc="upper center",
-            bbox_to_anchor=(0.5, -0.2),
-            ncols=2,
-        )
-    ax.set_title(f"{ccf_label(component, field.unit, labels)}: {TITLES[component]}")
-    return ax
+
+    def label(level: float) -> str:
+        return with_minus_signs(f"{level:g}")
+
+    ax.clabel(lines, levels[::2], fmt=label, fontsize=6)
 
 
-def _legend_patches(component: int, signs: set[int]) -> list:
-    """Return handles for a legend of the shades of these signs."""
+def _sign_legend(ax: Axes, component: int, signs: set[int], y: float) -> None:
+    """Explain the shades of these signs below a map, with the legend's top at a height
+    of the axes."""
     from matplotlib.patches import Patch
 
-    looks = ((1, PLUS), (-1, MINUS))
-    return [
-        Patch(facecolor=c, alpha=0.35, label=DIRECTIONS[component][k])
-        for k, (s, c) in enumerate(looks)
-        if s in signs
-    ]
+    ahead, back = DIRECTIONS[component]
+    handles = []
+    for sign, colour, label in ((1, PLUS, ahead), (-1, MINUS, back)):
+        if sign in signs:
+            handles.append(Patch(facecolor=colour, alpha=0.35, label=label))
+    ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, y), ncols=2)
 
 
-def _shaded(
-    ax, field: Field, component: int, gait: Gait, error: Field | None
+def _shade_area(
+    ax: Axes, field: Field, component: int, gait: Gait, error: Field | None
 ) -> set[int]:
-    """Shade the area of a gait by the sign of CCF times winding number; return the signs that occur."""
-    x, y = (np.linspace(a[0], a[-1], AREA) for a in field.axes)
-    shapes = np.stack(np.meshgrid(x, y, indexing="ij"), -1)
-    times = winding(gait.shape(PHASES), x, y)
+    """Shade the area of a gait by the sign of CCF times winding number; return the
+    signs that occur."""
     if field.masked:
         return set()
+    x, y = (np.linspace(a[0], a[-1], AREA_POINTS) for a in field.axes)
+    shapes = np.stack(np.meshgrid(x, y, indexing="ij"), -1)
+    times = winding(gait.shape(PHASES), x, y)
     density = Field(field.axes, field.values[component], 1)(shapes) * times
     if error is not None:
-        density[
-            np.abs(density)
-            <= np.abs(times) * Field(error.axes, error.values[component], 1)(shapes)
-        ] = 0.0
-    found = {s for s in (1, -1) if (s * density > 0).any()}
-    for s in found:
-        ax.contourf(
-            x,
-            y,
-            (s * density > 0).T,
-            levels=[0.5, 2.0],
-            colors=[PLUS if s > 0 else MINUS],
-            alpha=0.35,
-            zorder=0,
-        )
-    return found
+        errors = Field(error.axes, error.values[component], 1)(shapes)
+        density[np.abs(density) <= np.abs(times) * errors] = 0.0
+    signs = set()
+    for sign, colour in ((1, PLUS), (-1, MINUS)):
+        mask = sign * density > 0
+        if mask.any():
+            signs.add(sign)
+            look = {"levels": [0.5, 2.0], "colors": [colour], "alpha": 0.35}
+            ax.contourf(x, y, mask.T, zorder=0, **look)
+    return signs
 
 
 def winding(curve: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the winding number (N, M) of a closed curve (P, 2) around the points of the grid x (N,) by y (M,), positive
-    counter-clockwise: crossings, of either sign, of the line from each point to the right."""
-    (x0, y0), (x1, y1) = curve.T, np.roll(curve, -1, 0).T
-    below, above = y0[:, None] <= y, y1[:, None] <= y
-    k, j = np.nonzero(below != above)
-    at = x0[k] + (y[j] - y0[k]) / (y1[k] - y0[k]) * (x1[k] - x0[k])
-    crossed = np.zeros((len(x) + 1, len(y)), int)
-    np.add.at(crossed, (np.searchsorted(x, at), j), np.where(below[k, j], 1, -1))
-    return np.cumsum(crossed[::-1], 0)[::-1][1:]
+    """Return the winding number (N, M) of a closed curve (P, 2) around the points of
+    the grid x (N,) by y (M,), positive counter-clockwise.
+
+    It counts the crossings, with their sign, of the line from each point to the
+    right."""
+    x0, y0 = curve.T
+    x1, y1 = np.roll(curve, -1, 0).T
+    start_below = y0[:, None] <= y
+    end_below = y1[:, None] <= y
+    k, j = np.nonzero(start_below != end_below)
+    x_crossing = x0[k] + (y[j] - y0[k]) / (y1[k] - y0[k]) * (x1[k] - x0[k])
+    crossings = np.zeros((len(x) + 1, len(y)), int)
+    sign = np.where(start_below[k, j], 1, -1)
+    np.add.at(crossings, (np.searchsorted(x, x_crossing), j), sign)
+    return np.cumsum(crossings[::-1], 0)[::-1][1:]
 
 
 @CCF_STYLES.register(style="surface", projection="3d")
 @styled
 def ccf_surface(
-    field: Field, component: int = 0, gaits: Sequence[Gait] = (), *, ax: Axes | None = None, error: Field | None = None,
-    labels: Labels = ANGLES, clim: float | str | None = None,
-) -> Axes:  # fmt: skip
-    """Draw a component of the CCF as a surface over shape space, with gaits on it and, on the plane below, their areas shaded
-    by sign as in `ccf_contours`.
+    field: Field,
+    component: int = 0,
+    gaits: Sequence[Gait] = (),
+    *,
+    ax: Axes | None = None,
+    error: Field | None = None,
+    labels: Labels = ANGLES,
+    clim: float | str | None = None,
+) -> Axes:
+    """Draw a component of the CCF as a surface over shape space, with gaits on it and,
+    on the plane below, their areas shaded by sign as in `ccf_contours`.
 
-    ax: of projection "3d"; without it one of a new figure.
+    ax: of projection "3d"; by default one of a new figure. error: not drawn. Other
+    arguments as for `ccf_map`.
 
     Examples
     --------
     >>> import geomech
-    >>> ax = geomech.plots.ccf_surface(geomech.study("three-link-viscous", grid=15).tables.curvature, 0)
+    >>> study = geomech.study("three-link-viscous", grid=15).tables
+    >>> ax = geomech.plots.ccf_surface(study.curvature, 0)
     """
     from cmcrameri import cm
 
-    from geomech.plots.style import blank
-
-    ax = blank(4.2, 3.6).add_subplot(projection="3d") if ax is None else ax
+    if ax is None:
+        ax = blank(4.2, 3.6).add_subplot(projection="3d")
     field = drawable(field)
-    axes, values = finer(field, field.values[component])
-    most = limit_of(values, clim)
-    clipped = np.clip(values, -most, most)
+    axes, values = refined(field, field.values[component])
+    top = scale_limit(values, clim)
     ax.plot_surface(
-        *np.meshgrid(*axes, indexing="ij"), clipped, cmap=cm.vik, vmin=-most, vmax=most, rcount=121, ccount=121, lw=0,
-        antialiased=False, rasterized=True, alpha=0.9,
-    )  # fmt: skip
-    floor, signs = -1.6 * most, set()
+        *np.meshgrid(*axes, indexing="ij"),
+        np.clip(values, -top, top),
+        cmap=cm.vik,
+        vmin=-top,
+        vmax=top,
+        rcount=121,
+        ccount=121,
+        lw=0,
+        antialiased=False,
+        rasterized=True,
+        alpha=0.9,
+    )
+    floor = -1.6 * top
+    signs = set()
     for gait in gaits:
-        curve = gait.shape(PHASES)
-        ax.plot(*curve.T, floor, color="black", lw=1.0)
+        ax.plot(*gait.shape(PHASES).T, floor, color="black", lw=1.0)
         if not field.masked:
-            inside = (
-                (curve >= [a[0] for a in axes]) & (curve <= [a[-1] for a in axes])
-            ).all(-1)
-            height = np.full(len(curve), np.nan)
-            height[inside] = Field(field.axes, field.values[component], field.degree)(
-                curve[inside]
-            )
-            ax.plot(
-                *curve.T, np.clip(height, -most, most), color="black", lw=1.4, zorder=10
-            )
-            signs |= _floor(ax, field, component, gait, floor)
+            _draw_on_surface(ax, field, component, gait, top)
+            signs |= _shade_floor(ax, field, component, gait, floor)
     if signs:
-        ax.legend(
-            handles=_legend_patches(component, signs),
-            loc="upper center",
-            bbox_to_anchor=(0.5, 0.0),
-            ncols=2,
-        )
+        _sign_legend(ax, component, signs, 0.0)
+
     ax.set(
-        xlabel=quantity(*labels[0]), ylabel=quantity(*labels[1]), zlim=(floor, most),
+        xlabel=quantity(*labels[0]),
+        ylabel=quantity(*labels[1]),
+        zlim=(floor, top),
         title=f"{ccf_name(component)}: {TITLES[component]}",
-    )  # fmt: skip
+    )
     ax.set_zlabel(ccf_label(component, field.unit, labels), labelpad=6)
-    ax.set_zticks([x for x in ax.get_zticks() if -most <= x <= most])
+    ax.set_zticks([x for x in ax.get_zticks() if -top <= x <= top])
     ax.tick_params(labelsize=7)
     ax.view_init(elev=28, azim=-58)
     ax.set_box_aspect(None, zoom=0.86)
     return ax
 
 
-def _floor(ax, field: Field, component: int, gait: Gait, floor: float) -> set[int]:
-    """Shade the area of a gait on the plane below a surface; return the signs that occur."""
-    x, y = (np.linspace(a[0], a[-1], AREA // 2) for a in field.axes)
+def _draw_on_surface(
+    ax: Axes, field: Field, component: int, gait: Gait, top: float
+) -> None:
+    """Draw a gait at the height of the surface, as far as the field goes."""
+    curve = gait.shape(PHASES)
+    low = [axis[0] for axis in field.axes]
+    high = [axis[-1] for axis in field.axes]
+    inside = ((curve >= low) & (curve <= high)).all(-1)
+    surface = Field(field.axes, field.values[component], field.degree)
+    height = np.full(len(curve), np.nan)
+    height[inside] = surface(curve[inside])
+    height = np.clip(height, -top, top)
+    ax.plot(*curve.T, height, color="black", lw=1.4, zorder=10)
+
+
+def _shade_floor(
+    ax: Axes, field: Field, component: int, gait: Gait, floor: float
+) -> set[int]:
+    """Shade the area of a gait on the plane below a surface; return the signs that
+    occur."""
+    x, y = (np.linspace(a[0], a[-1], AREA_POINTS // 2) for a in field.axes)
     shapes = np.stack(np.meshgrid(x, y, indexing="ij"), -1)
-    density = Field(field.axes, field.values[component], 1)(shapes) * winding(
-        gait.shape(PHASES), x, y
-    )
-    for s, colour in ((1, PLUS), (-1, MINUS)):
-        if (s * density > 0).any():
+    times = winding(gait.shape(PHASES), x, y)
+    density = Field(field.axes, field.values[component], 1)(shapes) * times
+    signs = set()
+    for sign, colour in ((1, PLUS), (-1, MINUS)):
+        mask = sign * density > 0
+        if mask.any():
+            signs.add(sign)
             ax.contourf(
-                *np.moveaxis(shapes, -1, 0), (s * density > 0).astype(float), zdir="z", offset=floor, levels=[0.5, 2.0],
-                colors=[colour], alpha=0.35,
-            )  # fmt: skip
-    return {s for s in (1, -1) if (s * density > 0).any()}
-
-
-__all__ = [
-    "CCF_STYLES",
-    "CONNECTION_STYLES",
-    "ccf_contours",
-    "ccf_surface",
-    "streamlines",
-    "unit_of",
-    "winding",
-]
+                *np.moveaxis(shapes, -1, 0),
+                mask.astype(float),
+                zdir="z",
+                offset=floor,
+                levels=[0.5, 2.0],
+                colors=[colour],
+                alpha=0.35,
+            )
+    return signs

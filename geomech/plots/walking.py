@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-TRIPODS = ("0.2", "C0")  # colours of the legs in step
-PICTURES = 6  # of a strip
-ROOM = 2.4  # robots to either side of one that is followed
+TRIPOD_COLOURS = ("0.2", "C0")  # of the legs that move in step
+STRIP_PICTURES = 6
+FOLLOWED_SPAN = 2.4  # in half widths of a robot, to either side of one that is followed
 
 
 @styled
@@ -46,10 +46,10 @@ def walk_figure(result: Result) -> Figure:
 
 @styled
 def walk_strip(result: Result) -> Figure:
-    """Draw the last cycle in pictures."""
+    """Draw the last cycle of a walk in pictures from the side."""
     t = result["t"].values
     begin = max(0.0, t[-1] - 1 / float(result["frequency"]))
-    rows = rows_at(t, np.linspace(begin, t[-1], PICTURES))
+    rows = rows_at(t, np.linspace(begin, t[-1], STRIP_PICTURES))
     fig, axes = figure(2.3 * 3, 1.9 * 2, 3, 2, layout="compressed")
     for ax, row in zip(axes.ravel(), rows):
         walk_stage(ax, result, np.array([row]))(row)
@@ -59,7 +59,8 @@ def walk_strip(result: Result) -> Figure:
 
 
 def rows_at(t: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Return the rows of a walk at some times."""
+    """Return the rows of a walk whose times t (N,) are the first not before
+    ``times``."""
     return np.searchsorted(t, times - 1e-9).clip(0, len(t) - 1)
 
 
@@ -67,106 +68,124 @@ def walk_stage(
     ax: Axes, result: Result, rows: np.ndarray, follow: bool = False
 ) -> Callable[[int], None]:
     """Draw the ground on axes that hold the robot at these rows of its walk; return a
-    function that draws it at one. follow: the axes move with the robot."""
-    robot: Flat | Solid
+    function that draws the robot at one of them.
+
+    follow: the axes move with the robot."""
+    robot: FlatRobot | SolidRobot
     if "states" in result:
-        robot = Solid(result)
+        robot = SolidRobot(result)
     else:
-        robot = Flat(result)
-    reach, room = robot.reach, 1.1 * robot.room
-    t, x = result["t"].values, result["x"].values
-    seen = x[rows]
+        robot = FlatRobot(result)
+    reach = robot.leg_reach
+    t = result["t"].values
+    x = result["x"].values
+    shown_x = x[rows]
+    margin = 1.1 * robot.half_width
     if follow:
-        room, seen = ROOM * robot.room, seen[:1]
+        shown_x = shown_x[:1]
+        margin = FOLLOWED_SPAN * robot.half_width
     ax.axhspan(-3 * reach, 0.0, color="peru", alpha=0.35, lw=0)
     ax.set(
-        xlim=(seen.min() - room, seen.max() + room),
+        xlim=(shown_x.min() - margin, shown_x.max() + margin),
         ylim=(-1.2 * reach, 3.2 * reach),
         aspect="equal",
         xlabel="$x$ (m)",
         ylabel="$z$ (m)",
     )
-    draw, label = robot.on(ax), ax.set_title("", loc="left", fontsize=8)
+    draw_robot = robot.artist(ax)
+    title = ax.set_title("", loc="left", fontsize=8)
 
     def update(row: int) -> None:
-        draw(row)
-        label.set_text(f"t = {t[row]:.2f} s")
+        draw_robot(row)
+        title.set_text(f"t = {t[row]:.2f} s")
         if follow:
-            ax.set_xlim(x[row] - room, x[row] + room)
+            ax.set_xlim(x[row] - margin, x[row] + margin)
 
     return update
 
 
-class Flat:
-    """Outlines of a robot in the vertical plane. room: that it takes to both sides;
-    reach: of its legs, m."""
+class FlatRobot:
+    """The outlines of a robot in the vertical plane over its walk.
+
+    half_width: distance from its origin to its farthest point along x, m. leg_reach:
+    size of a leg, m."""
 
     def __init__(self, result: Result):
         scene = scene_of(result)
         robot = scene.robot
-        self.robot, self.gait = robot, scene.gait
+        self.robot = robot
+        self.gait = scene.gait
         self.t = result["t"].values
         self.pose = np.stack([result[name].values for name in ("x", "z", "pitch")], -1)
-        self.leg, self.belly = robot.leg(40).points, robot.belly(8)
-        self.reach = np.abs(self.leg).max()
-        self.hips = [(h, robot.hip_height) for h in robot.hips]
-        along = [abs(h) + self.reach for h, _ in self.hips]
-        half = getattr(robot, "length", 0.0) / 2
-        self.room = max(self.reach, half, *along)
+        self.leg = robot.leg(40).points
+        self.belly = robot.belly(8)
+        self.leg_reach = np.abs(self.leg).max()
+        self.hips = [(x, robot.hip_height) for x in robot.hips]
+        leg_ends = [abs(x) + self.leg_reach for x in robot.hips]
+        half_length = getattr(robot, "length", 0.0) / 2
+        self.half_width = max(self.leg_reach, half_length, *leg_ends)
 
-    def on(self, ax: Axes) -> Callable[[int], None]:
+    def artist(self, ax: Axes) -> Callable[[int], None]:
+        """Return a function that draws the robot at a row of its walk."""
         phases = self.robot.hip_phases
-        legs = [(k, at) for k in range(len(self.hips)) for at in phases]
+        legs = [(hip, phase) for hip in range(len(self.hips)) for phase in phases]
         lines = []
-        for k, at in legs:
-            colour = TRIPODS[int((k + 2 * at) % 2)]
-            lines.append(ax.plot([], [], color=colour, lw=1.2)[0])
-        box = ax.plot([], [], color="black", lw=1.2)[0]
+        for hip, phase in legs:
+            colour = TRIPOD_COLOURS[int((hip + 2 * phase) % 2)]
+            lines += ax.plot([], [], color=colour, lw=1.2)
+        (box,) = ax.plot([], [], color="black", lw=1.2)
 
         def draw(row: int) -> None:
-            pose, t = self.pose[row], self.t[row]
-            for line, (k, at) in zip(lines, legs):
-                phase = self.gait.frequency * t + (k * phases[-1] + at) % 1.0
-                hip = rotated(np.array([self.hips[k]]), pose[2]) + pose[:2]
-                turn = pose[2] + float(self.gait.angle(phase, phase))
-                line.set_data(*(rotated(self.leg, turn) + hip).T)
+            place = self.pose[row, :2]
+            pitch = self.pose[row, 2]
+            for line, (hip, phase) in zip(lines, legs):
+                offset = (hip * phases[-1] + phase) % 1.0
+                turns = self.gait.frequency * self.t[row] + offset
+                centre = rotated(np.array([self.hips[hip]]), pitch) + place
+                angle = pitch + float(self.gait.angle(turns, turns))
+                line.set_data(*(rotated(self.leg, angle) + centre).T)
             if self.belly is not None:
-                box.set_data(*(rotated(self.belly.points, pose[2]) + pose[:2]).T)
+                box.set_data(*(rotated(self.belly.points, pitch) + place).T)
 
         return draw
 
 
-class Solid:
-    """Triangles of a robot in three dimensions, seen from its right. room, reach: as for
-    `Flat`."""
+class SolidRobot:
+    """The triangles of a robot in three dimensions over its walk, seen from its right.
+
+    half_width, leg_reach: as for `FlatRobot`."""
 
     def __init__(self, result: Result):
         self.view = walking.view(scene_of(result))
         self.states = result["states"].values
         first = self.view.triangles(self.states[0]).reshape(-1, 3)
         start = [float(result["x"].values[0]), 0.0]
-        self.room = float(np.abs(first[:, [0, 1]] - start).max())
-        self.reach = max(float(np.ptp(first[:, 2])), self.room / 4) / 2
+        self.half_width = float(np.abs(first[:, [0, 1]] - start).max())
+        self.leg_reach = max(float(np.ptp(first[:, 2])), self.half_width / 4) / 2
 
-    def on(self, ax: Axes) -> Callable[[int], None]:
+    def artist(self, ax: Axes) -> Callable[[int], None]:
+        """Return a function that draws the robot at a row of its walk."""
         from matplotlib.collections import PolyCollection
         from matplotlib.colors import to_rgba
 
-        colours = np.array([to_rgba(c) for c in ("0.75", *TRIPODS)])[self.view.groups]
-        # Sheets are seen by their edges.
-        drawn = ax.add_collection(PolyCollection([], lw=1.0))
+        group_colours = np.array([to_rgba(c) for c in ("0.75", *TRIPOD_COLOURS)])
+        colours = group_colours[self.view.groups]
+        # Lines show sheets that are seen edge-on.
+        polygons = ax.add_collection(PolyCollection([], lw=1.0))
 
         def draw(row: int) -> None:
             triangles = self.view.triangles(self.states[row])
-            # What is farther off first.
+            # Farther triangles are drawn first.
             order = np.argsort(-triangles[..., 1].mean(1), kind="stable")
-            drawn.set_verts(triangles[order][..., [0, 2]])
-            drawn.set_facecolor(colours[order])
-            drawn.set_edgecolor(colours[order])
+            polygons.set_verts(triangles[order][..., [0, 2]])
+            polygons.set_facecolor(colours[order])
+            polygons.set_edgecolor(colours[order])
 
         return draw
 
 
 def rotated(points: np.ndarray, angle: float) -> np.ndarray:
-    c, s = np.cos(angle), np.sin(angle)
+    """Return points (N, 2) of x and z after a rotation of x towards -z, rad."""
+    c = np.cos(angle)
+    s = np.sin(angle)
     return points @ np.array([[c, -s], [s, c]])

@@ -221,7 +221,7 @@ class Ccf(Question):
             both = [result.attributes["frame"], result.attributes["other_frame"]]
         if "ccf" not in result:
             if both:
-                (options["beside"],) = slices_of(result, "other_ccf")
+                (options["other"],) = slices_of(result, "other_ccf")
             planes = slices_of(result, "ccf")
             if ax is not None:
                 raise Refusal("slices are drawn as a figure", instead="drop ``ax``")
@@ -251,7 +251,7 @@ class Ccf(Question):
             plane = stretch_of(result)
             return plots.stretched_figure(ccf, plane, unit=unit, **options)
         if both:
-            options["beside"] = field_of(result, "other_ccf")
+            options["other"] = field_of(result, "other_ccf")
         metric = None
         if "metric" in result or "norm" in result:
             metric = metric_of(result)

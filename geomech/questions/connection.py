@@ -273,7 +273,7 @@ class Connection(Question):
             number = tools.component_number(component)
             return plots.vector_field(connection, number, ax=ax, labels=labels)
         if "other_A" in result:
-            options["beside"] = connection_of(result, "other_A")
+            options["other"] = connection_of(result, "other_A")
             facts = result.attributes
             options["names"] = [facts["frame"], facts["other_frame"]]
         return plots.connection_figure(connection, **options)
