@@ -119,7 +119,7 @@ def variables(moved: Motion) -> list[Variable]:
     label = f"of the frame {moved.scene.frame}, seen from where it is at phase 0"
     for name, values, of in zip(POSE, moved.pose.T, (unit, unit, "rad")):
         found.append(Variable(name, OVER, values, of, label))
-    shapes = zip(moved.alpha.T, shape_labels(system), fields.angles_of(moved.alpha.T))
+    shapes = zip(moved.alpha.T, shape_labels(system), fields.angle_names(moved.alpha.T))
     for k, (values, (label, of), name) in enumerate(shapes):
         if label == name:
             label = (
@@ -162,7 +162,7 @@ def ends(points: np.ndarray | None, unit: str) -> list[Variable]:
 def of_map(tables: SceneTables) -> list[Variable]:
     """Return the CCF with its error over axes of its own names, as the shapes of a motion
     are over phase."""
-    ccf = fields.of_ccf(tables.curvature, tables.curvature_error)
+    ccf = fields.ccf_variable(tables.curvature, tables.curvature_error)
     labels = shape_labels(tables.scene.system)
     found = [Variable("component", ("component",), [*COMPONENTS])]
     for name, axis, (label, of) in zip(GRID[1:], tables.curvature.axes, labels):

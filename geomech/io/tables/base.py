@@ -30,7 +30,7 @@ BODY = ("lengths", "frame", "modes", "waves")  # what files say of a chain of li
 LAYOUTS = ("arrays", "struct")
 ORDERS = ("ndgrid", "meshgrid")
 # Readers, parse(raw, sign, order, sha256) -> Stored. Their attributes: suffix; write, a function of (path, result, **settings),
-# where a result as of `geomech.studies.fields.of_study` can be written; settings, names of those that it takes ("sign",
+# where a result as of `geomech.studies.fields.full_result` can be written; settings, names of those that it takes ("sign",
 # "order", "layout"); joints, the only number that it takes; whole, False where it takes no more than A, what is known of its
 # error, and a quadratic metric.
 FORMATS = Registry(

@@ -23,7 +23,7 @@ TICKS = np.array([-1.0, 0.0, 1.0])
 
 
 def write_struct(path: str | Path, result: Result) -> None:
-    """Write s, of the variables of `geomech.studies.fields.of_struct`; it appears whole or not at all."""
+    """Write s, of the variables of `geomech.studies.fields.struct_result`; it appears whole or not at all."""
     from scipy.io import savemat
 
     axes = [
