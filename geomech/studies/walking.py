@@ -111,9 +111,11 @@ def walked(
     cycles = SETTLING if settling else None
     advance = runner().call
 
-    callback = {}
-    if progress:
-        callback["progress"] = lambda done: progress(SHARE_OF_WALKS * done)
+    def report(done: float) -> None:
+        progress(SHARE_OF_WALKS * done)
+
+    # Without ``progress`` an engine reports none.
+    callback = {"progress": report} if progress else {}
     walks = chosen.walk(walkers, numerics, cycles, advance=advance, **callback)
 
     means = np.array([_means(walk) for walk in walks])
