@@ -101,8 +101,12 @@ def force_unit(scene: Scene, system: Loaded, sizes: Sizes) -> ForceUnit:
 
     missing = [name for name in ("length", "radius") if known[name] is None]
     if stress is None:
-        by_depth = system.axial_stress(1.0)
-        missing.append("depth" if by_depth else "stress")
+        # A medium with a measured stress needs the depth alone.
+        measured = system.axial_stress(1.0)
+        if measured:
+            missing.append("depth")
+        else:
+            missing.append("stress")
     return ForceUnit(None, length, frequency, "unknown in N", tuple(missing))
 
 

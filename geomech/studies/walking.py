@@ -301,7 +301,8 @@ def walk_cost(
     numerics = scene.numerics
     name = engine_name or scene.engine
     planar = name == "planar"
-    batch = min(count, BATCH if planar else 1)
+    # Other engines walk one robot after the other.
+    batch = min(count, BATCH) if planar else 1
     with located(scene.name):
         chosen = engine(name)
 
