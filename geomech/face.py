@@ -25,9 +25,9 @@ def connection_html(connection: Any) -> str:
 def connection_to_xarray(connection: Any, shapes: Sequence[str]) -> Any:
     """Return a connection as a Dataset."""
     from geomech.io.results import to_xarray
-    from geomech.studies.fields import of_fitted
+    from geomech.studies.fields import connection_result
 
-    return to_xarray(of_fitted(connection, shapes))
+    return to_xarray(connection_result(connection, shapes))
 
 
 @implements("Connection.load")
@@ -50,9 +50,9 @@ def field_html(field: Any) -> str:
 def field_to_xarray(field: Any, name: str, shapes: Sequence[str]) -> Any:
     """Return a field as a DataArray."""
     from geomech.io.results import to_xarray
-    from geomech.studies.fields import of_field
+    from geomech.studies.fields import field_result
 
-    return to_xarray(of_field(field, name, shapes))[name]
+    return to_xarray(field_result(field, name, shapes))[name]
 
 
 @implements("Result.__repr__")

@@ -118,7 +118,7 @@ PLACE = FOUND["place"][0]
 )
 def test_a_motion_takes_the_balances_foretold(scene, cycles, solved):
     foretold = motion.cost(scene, cycles).balances
-    motion.motion(scene, cycles)
+    motion.compute_motion(scene, cycles)
     assert foretold == sum(solved)
 
 

@@ -205,7 +205,7 @@ def test_extremes_of_a_ccf_are_told_with_their_places_and_the_larger_error():
         Variable(f"alpha_{k}", (f"alpha_{k}",), x, "rad") for k, x in enumerate(AXES, 1)
     ]
     component = Variable("component", ("component",), ["x", "y", "theta"])
-    result = Result("", (component, *axes, fields.of_ccf(field, error)))
+    result = Result("", (component, *axes, fields.ccf_variable(field, error)))
     (table,) = (part for part in show.parts(result) if isinstance(part, show.Table))
     rows = [*zip(table.first, *(column for (column,) in table.blocks))]
     head, x, y, theta = rows

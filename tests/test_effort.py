@@ -222,7 +222,7 @@ def test_the_file_has_what_a_change_of_shape_costs(medium, tmp_path):
     there = study.effort(amplitudes=[1.0])
     assert again["path_length"] == pytest.approx(there["path_length"], rel=3e-3)
     assert again["work"] == pytest.approx(there["work"], rel=5e-3)
-    saved = to_xarray(fields.of_study(study))
+    saved = to_xarray(fields.full_result(study))
     assert saved.attrs["power_degree"] == table.traits.power_degree
     assert ("metric" if medium is FLUID else "norm") in saved
 
@@ -321,7 +321,7 @@ def test_a_metric_of_the_systems_own_has_lengths_and_no_work(name, capsys):
         ended.value.code == 0
         and f"path length ({effort.METRIC})" in capsys.readouterr().out
     )
-    assert "metric" in to_xarray(fields.of_study(study))
+    assert "metric" in to_xarray(fields.full_result(study))
 
 
 def test_phases_of_a_cost_are_fours_and_its_errors_are_what_half_of_them_change():

@@ -328,13 +328,13 @@ def test_newtons_and_watts_follow_from_sizes():
     assert (
         by_stress["medium_power"].unit == "J/rad" and by_stress["power"].unit == "N/rad"
     )
-    assert of_plain.newtons.lacks == ("length", "radius", "depth")
+    assert of_plain.unit.missing == ("length", "radius", "depth")
     fluid = (
         geomech.load("three-link-viscous")
         .changed(body=Chain(length=0.3))
         .with_numerics(phases=16)
     )
-    assert forces(fluid)[1].newtons.lacks == ("radius", "stress")
+    assert forces(fluid)[1].unit.missing == ("radius", "stress")
     heavy = geomech.load("sandfish-heavy")
     with pytest.raises(
         Refusal,

@@ -138,7 +138,7 @@ def test_momentum_is_conserved_in_the_world(system, frame):
     """Over two cycles, whatever the frame; and `cost` is twice the kinetic energy that is seen."""
     system = in_frame(system, frame)
     masses, inertia, unit = own(system)
-    found = moving.motion(Scene(system, OVAL, Numerics(phases=256)), 2)
+    found = moving.compute_motion(Scene(system, OVAL, Numerics(phases=256)), 2)
     impulse, size, energy = impulses(found, masses, inertia)
     assert min(size) > 1e-6
     assert (np.abs(impulse) < 1e-9 * np.array(size)).all()

@@ -168,7 +168,7 @@ def test_a_cycle_ends_where_the_direct_tier_says(name):
     scene = SCENES[name]
     n = scene.numerics.phases
     net = SceneTables(scene).poses("direct")
-    one, two = moving.motion(scene), moving.motion(scene, 2)
+    one, two = moving.compute_motion(scene), moving.compute_motion(scene, 2)
     np.testing.assert_allclose(one.pose[-1], net, atol=1e-13)
     np.testing.assert_allclose(two.pose[:n], one.pose[:n], atol=1e-13)
     repeats = name in ("swimmer", "no-slip", "transient", "heavy")
@@ -201,14 +201,16 @@ def test_where_cycles_differ_each_goes_on_from_the_one_before(name):
         ).pose
     ground = np.concatenate([last[cycles - 1][:-1], last[cycles]])
     expected = se2.compose(se2.inverse(ground[:1]), ground)
-    np.testing.assert_allclose(moving.motion(scene, 2).pose, expected, atol=1e-13)
+    np.testing.assert_allclose(
+        moving.compute_motion(scene, 2).pose, expected, atol=1e-13
+    )
 
 
 @pytest.mark.parametrize("frame", ["mean", "link-1", "link-3"])
 def test_wheels_do_not_slip_in_the_world(frame):
     """Of the no-slip snake: centres of links move along their links, by differences of order 8 of the ends in the world."""
     snake = NoSlipSnake((0.8, 1.3, 1.0), 0.4, frame)
-    found = moving.motion(Scene(snake, ZIGZAG, Numerics(phases=256)), 2)
+    found = moving.compute_motion(Scene(snake, ZIGZAG, Numerics(phases=256)), 2)
     ends = found.points()
     step, weights = found.phase[1], (4 / 5, -1 / 5, 4 / 105, -1 / 280)
     rate = (
@@ -239,7 +241,7 @@ def at_bench(scene, hertz):
 @pytest.mark.parametrize("name", ["swimmer", "no-slip", "second on a slope"])
 def test_a_table_reads_back_with_every_digit(name, tmp_path):
     pandas = pytest.importorskip("pandas")
-    found, path = moving.motion(SCENES[name], 2), tmp_path / "out.csv"
+    found, path = moving.compute_motion(SCENES[name], 2), tmp_path / "out.csv"
     Trajectory(SCENES[name], 2).ask().save(path)
     frame = pandas.read_csv(path)
     numpy = np.genfromtxt(path, delimiter=",", names=True)
@@ -258,7 +260,7 @@ def test_a_table_reads_back_with_every_digit(name, tmp_path):
 
 def test_time_where_the_gait_has_a_frequency(tmp_path):
     scene = at_bench(scenes.parse(SCENE.format("")), 2.5)
-    found = moving.motion(scene, 3)
+    found = moving.compute_motion(scene, 3)
     np.testing.assert_allclose(found.time[-1], 3 / 2.5)
     result = Trajectory(scene, 3).ask()
     assert list(result.only("time", "x")) == ["phase", "time", "x"]
@@ -301,9 +303,9 @@ def test_too_much_is_refused_before_it_begins(tmp_path):
     scene = scenes.load("sandfish-transient")
     for cycles in (0, 10_001, 1.5, True, "2", None):
         with pytest.raises(Refusal, match="whole number from 1 to 10000"):
-            moving.motion(scene, cycles)
+            moving.compute_motion(scene, cycles)
     with pytest.raises(Refusal, match="a motion is that of a Scene, got 'sandfish'"):
-        moving.motion("sandfish")
+        moving.compute_motion("sandfish")
     with pytest.raises(Refusal, match="say yes"):
         moving.cost(scene, 10_000).check("scene", False)
     moving.cost(scene, 10).check("scene", False)
@@ -332,7 +334,7 @@ def field(chain):
 
 def test_a_film_shows_body_track_and_shape(chain, field):
     scene = chain.question.scene
-    found = moving.motion(scene, 2)
+    found = moving.compute_motion(scene, 2)
     shown = films.rows(32, 2)
     np.testing.assert_array_equal(
         shown, np.arange(100) * 32 // 50
@@ -417,7 +419,7 @@ def test_a_gif_shows_its_phases_and_takes_as_long_as_it_says(
 
 
 def test_a_strip_numbers_bodies_and_shapes_alike(chain, tmp_path):
-    found = moving.motion(chain.question.scene)
+    found = moving.compute_motion(chain.question.scene)
     fig = chain.plot()
     rows = np.linspace(0, 32, 6).round().astype(int)
     pictures = [ax for ax in fig.axes if "cycle" in ax.get_title("left")]
@@ -454,7 +456,7 @@ OTHERS = {
 
 @pytest.mark.parametrize("name", OTHERS)
 def test_systems_without_a_map_are_shown_all_the_same(name, tmp_path):
-    found = moving.motion(OTHERS[name], 2)
+    found = moving.compute_motion(OTHERS[name], 2)
     result = Trajectory(OTHERS[name], 2).ask()
     fig, put = plots.stage(result, films.rows(found.scene.numerics.phases, 2))
     shapes, joints = fig.axes[1], found.scene.system.joints
@@ -516,7 +518,7 @@ class Sled:
 
 def test_a_system_without_a_body_is_an_arrow():
     scene = Scene(Sled(), OVAL, Numerics(phases=24))
-    found = moving.motion(scene)
+    found = moving.compute_motion(scene)
     assert found.points() is None
     result = Trajectory(scene, mapped=False).ask()
     table = result.to_dataframe()

@@ -54,7 +54,7 @@ def result_of(optimum, stretched=False):
     of_ccf, about = variables.gained(optimum)
     found += [*variables.loop(optimum), *of_ccf]
     if stretched:
-        found += fields.of_stretch(optimum.stretched, "BL")
+        found += fields.stretch_variables(optimum.stretched, "BL")
     scene = optimum.request.scene
     facts = {"scene": scene.name, **facts, **about}
     question = Optimize(scene, optimum.request.objective.name)

@@ -227,7 +227,7 @@ def test_intervals_of_a_table_of_ones_own_are_kept_and_part_of_its_error(
             halves, error * np.array([0.5, 0.5, 1]).reshape(3, 1, 1, 1)
         )
     table = SceneTables(Scene(Table(path), GAIT))
-    np.testing.assert_array_equal(fields.of_study(table).to_xarray().A_error, error)
+    np.testing.assert_array_equal(fields.full_result(table).to_xarray().A_error, error)
     fields.save_connection(tmp_path / "b.nc", table)
     fields.save_connection(tmp_path / "b.mat", table, sign="-", order="meshgrid")
     for again in (tables.load(tmp_path / "b.nc"), tables.load(tmp_path / "b.mat")):

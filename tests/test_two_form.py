@@ -141,18 +141,18 @@ def test_the_file_has_all_pairs(form, tmp_path):
     )
     fields.save_connection(tmp_path / "made.nc", study)
     assert np.array_equal(Connection.load(tmp_path / "made.nc").A, study.fitted.A)
-    saved = to_xarray(fields.of_study(study))["ccf_pairs"]
+    saved = to_xarray(fields.full_result(study))["ccf_pairs"]
     assert (
         saved.dims[:2] == ("pair", "component") and "1 2, 1 3, 2 3" in saved.long_name
     )
     assert np.array_equal(saved[1], study.two_form.pair(0, 2).values)
-    assert "metric" in to_xarray(fields.of_study(study))
-    apart = to_xarray(fields.of_study(study))["ccf_pairs_error"]
+    assert "metric" in to_xarray(fields.full_result(study))
+    apart = to_xarray(fields.full_result(study))["ccf_pairs_error"]
     assert (
         np.array_equal(apart[2], curvature.error(study.fitted, 1, 2).values)
         and apart.dims == saved.dims
     )
-    assert to_xarray(fields.of_study(study))["pair_joints"].values.tolist() == [
+    assert to_xarray(fields.full_result(study))["pair_joints"].values.tolist() == [
         [1, 2],
         [1, 3],
         [2, 3],

@@ -625,7 +625,7 @@ def test_what_a_walk_takes_is_told_from_its_first_steps(geomech, tmp_path):
     """Of a body so light that it bounces, of one whose legs are so fast that it takes many cycles to come to their speed."""
     numerics = dataclasses.replace(QUICK, duration=10.0)
     usual, light, fast = (
-        walking.price(
+        walking.walk_cost(
             dataclasses.replace(XPLORER, numerics=numerics, **changes)
         ).balances
         for changes in (
@@ -653,7 +653,7 @@ def test_a_sweep_takes_the_strides_until_robots_walk_steadily_and_no_more():
             XPLORER, numerics=dataclasses.replace(QUICK, duration=duration)
         )
         over = {"gait.frequency": [1.0, 2.0]}
-        return Plan(scene, over).cost.balances, walking.price(scene).balances
+        return Plan(scene, over).cost.balances, walking.walk_cost(scene).balances
 
     (brief, one), (long, whole) = costs(0.5), costs(20.0)
     assert brief == long and whole > one > 2 * walking.LIMIT * QUICK.steps

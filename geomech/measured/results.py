@@ -13,7 +13,7 @@ from geomech.geometry.curvature import error as curvature_error
 from geomech.geometry.tube import BEYOND
 from geomech.measured.fit import PRINTED_PHASES, Fitted
 from geomech.studies import fields
-from geomech.studies.fields import INTERVAL_OF_CCF, angles_of
+from geomech.studies.fields import INTERVAL_OF_CCF, angle_names
 from geomech.systems.base import body_size
 
 ALONG = "fitted along the gait alone"
@@ -53,7 +53,7 @@ def fit_result(fit: Fitted, mapped: bool = True) -> Result:
         *_quality(fit),
         *_along(fit),
         *_cycles(fit),
-        *fields.of_known(fit.taylor, fit.unit),
+        *fields.taylor_variables(fit.taylor, fit.unit),
     ]
     lead = [
         Variable("component", ("component",), np.array(COMPONENTS)),
@@ -97,7 +97,7 @@ def _displacements(fit: Fitted) -> list[Variable]:
 def _quality(fit: Fitted) -> list[Variable]:
     """Return how well the connection explains the log."""
     over = ("component",)
-    rates = fields.of_components(fit.unit, "rad")
+    rates = fields.component_units(fit.unit, "rad")
     difference = np.sqrt(((fit.measured - fit.predicted) ** 2).mean(0))
     recorded = (*fit.log.joints, *POSE)
     of_time = "Hz" if fit.log.seconds else "1/unit of t"
@@ -138,7 +138,7 @@ def _along(fit: Fitted) -> list[Variable]:
     """Return A, its error, and the reach of the data along the mean gait."""
     t = 2 * np.pi * np.arange(PRINTED_PHASES) / PRINTED_PHASES
     A, error = (np.moveaxis(x, 0, -1) for x in fit.along(t))
-    rates = fields.of_components(fit.unit, "rad")
+    rates = fields.component_units(fit.unit, "rad")
     return [
         Variable("phase", ("phase",), t, "rad", "of the mean gait"),
         Variable(
@@ -183,12 +183,12 @@ def _maps(fit: Fitted) -> tuple[list[Variable], list[Variable]]:
     """Return the axes of shape space, and fields over them."""
     tube = fit.tube
     error = tube.on_grid(tube.taylor.connection_error)
-    labels = [(name, "rad") for name in angles_of(tube.axes)]
+    labels = [(name, "rad") for name in angle_names(tube.axes)]
     _, _, *axes = fields.coordinates(tube.axes, labels)
-    maps = [*fields.of_connection(tube, error), fields.of_reach(tube)]
+    maps = [*fields.connection_variables(tube, error), fields.reach_variable(tube)]
     if len(tube.axes) == 2:
         error = curvature_error(tube)
-        maps.append(fields.of_ccf(ccf(tube), error, INTERVAL_OF_CCF))
+        maps.append(fields.ccf_variable(ccf(tube), error, INTERVAL_OF_CCF))
     return axes, maps
 
 

@@ -169,7 +169,7 @@ def gained(optimum: Optimum) -> tuple[list[Variable], Mapping[str, Any]]:
         "gained_frame": frame,
         "interpolation": field.degree,
     }
-    return [coordinate, *axes, fields.of_ccf(field, name="gained_ccf")], facts
+    return [coordinate, *axes, fields.ccf_variable(field, name="gained_ccf")], facts
 
 
 def check_stretch(scene: Scene) -> None:

@@ -20,7 +20,7 @@ from geomech.plots.maps import (
 from geomech.plots.style import blank, figure, quantity, styled
 from geomech.results.fields import field_of
 from geomech.results.scenes import scene_of
-from geomech.studies.fields import angles_of
+from geomech.studies.fields import angle_names
 from geomech.studies.motion import Motion
 from geomech.studies.tables import poses
 from geomech.systems.base import body_size, length_unit, shape_labels
@@ -211,7 +211,7 @@ def time_text(motion: Motion, row: int) -> str:
 def motion_of(result: Result) -> Motion:
     """Return the motion of a scene from its result."""
     scene = scene_of(result)
-    names = angles_of(range(scene.system.joints))
+    names = angle_names(range(scene.system.joints))
     alpha = np.stack([result[name].values for name in names], -1)
     frequency = result.attributes.get("frequency")
     return Motion(scene, result["phase"].values, alpha, poses(result), frequency)

@@ -153,21 +153,21 @@ class Ccf(Question):
         labels = shape_labels(self.scene.system)
         found = [
             *fields.coordinates(ccf.axes, labels),
-            fields.of_ccf(ccf, tables.curvature_error),
+            fields.ccf_variable(ccf, tables.curvature_error),
             *shape_space.zero_line(ccf, self.scene.gait.middle),
         ]
         if space.enclosed is not None:
             found += shape_space.enclosed_area(space.enclosed)
         if self.metric:
-            found += fields.of_metric(tables.metric)
+            found += fields.metric_variables(tables.metric)
         if space.stretch is not None:
-            found += fields.of_stretch(
+            found += fields.stretch_variables(
                 space.stretch, units(self.scene.system)["path_length"]
             )
         if space.other is not None:
             ccf = space.other.curvature
             error = space.other.curvature_error
-            found.append(fields.of_ccf(ccf, error, name="other_ccf"))
+            found.append(fields.ccf_variable(ccf, error, name="other_ccf"))
         return Result("ccf", tuple(found), facts)
 
     @staticmethod

@@ -176,10 +176,13 @@ class Connection(Question):
 
         space = self._plan(run).compute(run.progress)
         tables = space.study
-        found = fields.of_fitted_study(tables)
+        found = fields.fitted_result(tables)
         for kind in self.contents:
             found = found.with_variables(*fields.CONTENTS[kind](tables).variables)
-        more = [*fields.of_fit(tables), *cost_variables(space.balances, space.seconds)]
+        more = [
+            *fields.fit_variables(tables),
+            *cost_variables(space.balances, space.seconds),
+        ]
         if space.planes:
             dims = {v.name for v in found.variables}
             slices = shape_space.slices(space.planes)
@@ -190,7 +193,7 @@ class Connection(Question):
             facts["contents"] = " ".join(self.contents)
         if space.other is not None:
             facts["other_frame"] = self.compare_frame
-            A, *_ = fields.of_connection(space.other.fitted)
+            A, *_ = fields.connection_variables(space.other.fitted)
             more.append(replace(A, name="other_A", error=None))
         found = found.with_variables(*more)
         return Result("connection", found.variables, facts)

@@ -118,7 +118,7 @@ class Optimize(Question):
     def compute(self, run: Run) -> Result:
         from geomech.optimisation import search, variables
         from geomech.studies.effort import units
-        from geomech.studies.fields import of_stretch
+        from geomech.studies.fields import stretch_variables
 
         optimum = search(self.request, run.progress)
         found = variables.variables(optimum)
@@ -129,7 +129,7 @@ class Optimize(Question):
             facts.update(about)
         if self.stretched:
             unit = units(self.scene.system)["path_length"]
-            found += of_stretch(optimum.stretched, unit)
+            found += stretch_variables(optimum.stretched, unit)
         return Result("optimize", tuple(found), facts)
 
     @staticmethod

@@ -71,7 +71,7 @@ class Trajectory(Question):
     def check(self) -> None:
         from geomech.studies import motion
 
-        motion.checked(self.count)
+        motion.refuse_cycles(self.count)
 
     def cost(self) -> Cost:
         from geomech.studies import motion

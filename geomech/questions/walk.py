@@ -61,7 +61,7 @@ class Walk(Question):
     def cost(self) -> Cost:
         from geomech.studies import walking
 
-        return walking.price(self.scene, by=self.engine)
+        return walking.walk_cost(self.scene, engine_name=self.engine)
 
     def compute(self, run: Run) -> Result:
         from geomech.studies import walking

@@ -110,7 +110,7 @@ def pairs_of(result: Result, name: str) -> list[tuple[str, tuple[int, int]]]:
 
 def stretch_of(result: Result) -> Stretch:
     """Return the stretched shape space of a result
-    (`geomech.studies.fields.of_stretch`)."""
+    (`geomech.studies.fields.stretch_variables`)."""
     shape = result["stretched_shape"]
     degree = int(result["stretch_interpolation"].values)
     return Stretch(

@@ -27,11 +27,12 @@ from rft.laws.drag import Rod, rod_drag
 UNITS = {"axial_stress": "Pa", "axial_force": "N", "gamma0_deg": "degrees"}
 SIZES = {"radius": "m", "length": "m", "depth": "m", "density": "kg/m^3"}
 CURVE = np.linspace(0.0, np.pi / 2, 181)  # attack angles at which a law is drawn, rad
-ROUNDED = 12  # decimal places of forces by a law, N
+FORCE_DECIMALS = 12  # of forces by a law, N
 
 
 def chosen_law(source: str, law: str | None) -> str:
-    """Return the name of the law that is fitted, by the columns of a file if None."""
+    """Return the name of a law to be fitted, checked; for None the law that the columns
+    of the file determine."""
     if law is None:
         law = law_of(source)
     return choose("``law``", law, CALIBRATIONS)
@@ -45,10 +46,10 @@ def answer(
 ) -> Result:
     """Return a law fitted to the measurements of a file, with its medium as text.
 
-    law: one of CALIBRATIONS, by the columns of the file if None. sizes: those of the rod
-    or plate that overrule the file's. end_caps: e of the rod's ends (`rft.EndCaps`), 0 to
-    leave them out, or "fitted". Refusal, one line that names the file, if the data are
-    bad or do not determine the law."""
+    law: one of CALIBRATIONS, by the columns of the file if None. sizes: of the rod or
+    plate, which overrule the file's. end_caps: e of the rod's ends (`rft.EndCaps`), 0
+    to leave them out, or "fitted". Refusal, one line that names the file, if the data
+    are bad or do not determine the law."""
     name = chosen_law(source, law)
     return CALIBRATIONS[name](name, source, sizes or {}, end_caps)
 
@@ -85,7 +86,8 @@ def rod_drags(
     """Return a law fitted to the drag on a rod."""
     measured = drag.read(source)
     f = _fit(law, measured, sizes, end_caps)
-    with located(measured.name):  # what no medium can be, such as a k of thousands
+    # A fitted value may be none that a medium can have, such as a k of thousands.
+    with located(measured.name):
         text = medium_text(f, measured.name)
     facts = {
         "file": measured.name,
@@ -94,9 +96,9 @@ def rod_drags(
         "angles": f.data.n_angles,
         "medium_toml": text,
     }
-    lacks = [name for name in SIZES if not getattr(f.rod, name)]
-    if FITS[law].granular and lacks:
-        facts["lacks"] = ", ".join(lacks)
+    missing = [name for name in SIZES if not getattr(f.rod, name)]
+    if FITS[law].granular and missing:
+        facts["lacks"] = ", ".join(missing)
     variables = fit_variables(f, measured.rows[0])
     return Result("fit_medium", tuple(variables), facts)
 
@@ -104,22 +106,27 @@ def rod_drags(
 def fit_variables(f: Fit, psi: np.ndarray) -> list[Variable]:
     """Return the variables of a law fitted to the drag on a rod. psi: (N,), the attack
     angles of the measurements, degrees."""
-    return [*_parameters(f), *_of_rod(f), *_rows(f, psi), *_curve(f)]
+    return [
+        *_parameter_variables(f),
+        *_rod_variables(f),
+        *_row_variables(f, psi),
+        *_curve_variables(f),
+    ]
 
 
-def _parameters(f: Fit) -> list[Variable]:
+def _parameter_variables(f: Fit) -> list[Variable]:
     """Return the parameters of a law."""
     over = ("parameter",)
-    names = [_in_degrees(name) for name in f.names]
+    names = [_displayed_name(name) for name in f.names]
     units = same_or_each([UNITS.get(name, "1") for name in names])
     half_width = student_factor(f.degrees_of_freedom) * f.errors
     return [
         Variable("parameter", over, names),
         Variable(
-            "value", over, _displayed(f, f.values), units, "fitted",
-            _displayed(f, half_width), error_label=INTERVAL,
+            "value", over, _with_degrees(f, f.values), units, "fitted",
+            _with_degrees(f, half_width), error_label=INTERVAL,
         ),
-        Variable("standard_error", over, _displayed(f, f.errors), units, "of value"),
+        Variable("standard_error", over, _with_degrees(f, f.errors), units, "of value"),
         Variable(
             "covariance", (*over, "other_parameter"), f.covariance, "",
             "of the parameters, gamma0 in rad",
@@ -127,8 +134,8 @@ def _parameters(f: Fit) -> list[Variable]:
     ]  # fmt: skip
 
 
-def _of_rod(f: Fit) -> list[Variable]:
-    """Return what is known of the whole rod."""
+def _rod_variables(f: Fit) -> list[Variable]:
+    """Return forces on the whole rod, residuals and sizes, as far as they are known."""
     found = [Variable("axial_force", (), f.axial_force, "N", "on the whole rod")]
     if f.axial_stress is not None:
         label = "over the projected area"
@@ -143,16 +150,16 @@ def _of_rod(f: Fit) -> list[Variable]:
     for name, unit in SIZES.items():
         size = getattr(f.rod, name)
         if size is not None:
-            of = "of the bed" if name == "density" else "of the rod"
-            found.append(Variable(f"rod_{name}", (), size, unit, of))
+            label = "of the bed" if name == "density" else "of the rod"
+            found.append(Variable(f"rod_{name}", (), size, unit, label))
     return found
 
 
-def _rows(f: Fit, psi: np.ndarray) -> list[Variable]:
+def _row_variables(f: Fit, psi: np.ndarray) -> list[Variable]:
     """Return the measured forces beside those by the law."""
     over = ("component", "row")
     folded = "attack angle, folded into 0 to 90 degrees"
-    fitted = np.round(f.data.forces - f.residuals, ROUNDED) + 0.0
+    fitted = np.round(f.data.forces - f.residuals, FORCE_DECIMALS) + 0.0
     return [
         Variable("component", ("component",), ["parallel", "perpendicular"]),
         Variable("psi", ("row",), psi, "degrees", "attack angle"),
@@ -163,7 +170,7 @@ def _rows(f: Fit, psi: np.ndarray) -> list[Variable]:
     ]
 
 
-def _curve(f: Fit) -> list[Variable]:
+def _curve_variables(f: Fit) -> list[Variable]:
     """Return the law against the attack angle."""
     return [
         Variable("angle", ("angle",), np.degrees(CURVE), "degrees", "attack angle"),
@@ -178,8 +185,9 @@ def medium_text(f: Fit, name: str) -> str:
     """Return the text of a file that a scene takes as ``[medium] file``. name: of the
     file of the measurements."""
     size = f"{f.data.n_angles} angles, rms residual {f.rms:.3g} N"
-    lines = [f"# Fitted to {json.dumps(name)}: {size}{_uncertain_words(f)}."]
+    lines = [f"# Fitted to {json.dumps(name)}: {size}{_covariance_words(f)}."]
     if f.data.ends is not None and f.end_caps:
+        # The last two parameters are those of the ends.
         parts = []
         for key, x, error in zip(("e", "across"), f.values[-2:], f.errors[-2:]):
             parts.append(f"{key} = {x:.3g} +- {error:.2g}")
@@ -190,8 +198,9 @@ def medium_text(f: Fit, name: str) -> str:
     return "\n".join([*lines, table("medium", _medium(f))])
 
 
-def _uncertain_words(f: Fit) -> str:
-    """Return which parameters have a covariance; "" for none."""
+def _covariance_words(f: Fit) -> str:
+    """Return the end of a comment that names the parameters with a covariance; "" for
+    none."""
     uncertain = getattr(f.medium, "uncertain", ())
     if not uncertain:
         return ""
@@ -212,36 +221,39 @@ def _medium(f: Fit) -> dict[str, Any]:
             value = math.degrees(value)
         if field.name == "covariance":
             value = [list(row) for row in value]
-        found[_in_degrees(field.name)] = value
+        found[_displayed_name(field.name)] = value
     return found
 
 
-def _displayed(f: Fit, values: np.ndarray) -> np.ndarray:
+def _with_degrees(f: Fit, values: np.ndarray) -> np.ndarray:
     """Return values (n,) of the parameters with gamma0 in degrees."""
-    shown = np.array(values, float)
+    found = np.array(values, float)
     for k, name in enumerate(f.names):
         if name == "gamma0":
-            shown[k] = np.degrees(shown[k])
-    return shown
+            found[k] = np.degrees(found[k])
+    return found
 
 
-def _in_degrees(name: str) -> str:
-    """Return the name of a parameter, of an angle that in degrees."""
+def _displayed_name(name: str) -> str:
+    """Return the name under which results and files have a parameter: that of gamma0
+    tells its unit, degrees."""
     if name == "gamma0":
         return "gamma0_deg"
     return name
 
 
 def repeats(psi: np.ndarray, forces: np.ndarray) -> float | None:
-    """Return the root mean square of forces about their means at equal angles, N, with
-    the degrees of freedom that these leave; None if no angle is repeated. No law can go
-    below it."""
-    _, which, counts = np.unique(psi.round(9), return_inverse=True, return_counts=True)
-    free = psi.size - counts.size
-    if free < 1:
+    """Return the root mean square of forces (2, N) about their means at equal angles
+    psi (N,), N, with the degrees of freedom that these leave; None if no angle is
+    repeated.
+    No law can have smaller residuals."""
+    _, group, counts = np.unique(psi.round(9), return_inverse=True, return_counts=True)
+    degrees_of_freedom = psi.size - counts.size
+    if degrees_of_freedom < 1:
         return None
-    means = np.array([np.bincount(which, f) / counts for f in forces])
-    return float(np.sqrt(((forces - means[:, which]) ** 2).sum() / (2 * free)))
+    means = np.array([np.bincount(group, f) / counts for f in forces])
+    squares = ((forces - means[:, group]) ** 2).sum()
+    return float(np.sqrt(squares / (2 * degrees_of_freedom)))
 
 
 CALIBRATIONS: dict[str, Callable[..., Result]] = {

@@ -1,9 +1,12 @@
-"""Forces along a body that undulates: thrust and drag of each part of it at each phase, power, bending moment, activation.
+"""Forces along a body that undulates: thrust and drag of each part at each phase,
+power, bending moment, activation.
 
-The force of the medium on an element has a normal part, across it, and a tangential part, along it; points that effects add at
-the ends have forces of their own. The component of a part in the direction of travel is thrust where it pushes the body
-forwards and drag where it holds it back. The direction of travel is that of the net displacement; where the body turns in a
-cycle, it turns evenly with the phase, as on a circle. Without mass and slope all forces balance at every phase."""
+The force of the medium on an element has a normal part, across it, and a tangential
+part, along it; points that effects add at the ends have forces of their own. The
+component of a part in the direction of travel is thrust where it pushes the body
+forwards and drag where it holds it back. The direction of travel is that of the net
+displacement. Where the body turns in a cycle, this direction turns evenly with the
+phase, as on a circle. Without mass and slope all forces balance at every phase."""
 
 from __future__ import annotations
 
@@ -18,28 +21,43 @@ from geomech.run.cost import Cost
 from geomech.scenes.model import Scene
 from geomech.studies.cost import direct, price
 from geomech.studies.elements import coarser, elements_of, gait_with
-from geomech.studies.newtons import Newtons, Sizes, newtons
-from geomech.studies.undulation import activation_of, bends, loaded
+from geomech.studies.newtons import ForceUnit, Sizes, force_unit
+from geomech.studies.undulation import activation_of_bends, bends, loaded
 from geomech.systems.base import body_size, length_unit
 from geomech.systems.capabilities import Stepped, capability, pieces_per_length, refined
 from rft.core.premise import Premise
 from rft.core.refusal import located
 
-FLANK, PARTS = ("normal", "tangential"), ("normal", "tangential", "ends")
+FLANK = ("normal", "tangential")
+PARTS = (*FLANK, "ends")
+# What pushes, and what holds back.
+SIDES = {
+    "thrust": (np.maximum, "forwards"),
+    "drag": (np.minimum, "backwards"),
+}
 PLACES = (0.25, 0.5, 0.75)  # of the body, at which the lag of activation is shown
-SEEN = 1.2  # times a change: that to a law computed more exactly is nearly all of the error (`geomech.studies.estimate`)
-NEAR = 1 / 32  # cycle
-LEAST_STEPS = 8  # of time stepping
-STILL = 1e-6  # body lengths per cycle, below which there is no direction of travel
-WHAT = "force along the body"
-WORK = "drag x BL/rad"
-UNKNOWN = Sizes()
+# Error over the change to a law computed more exactly, which is nearly all of the error
+# (`geomech.studies.estimate`).
+ERROR_OVER_CHANGE = 1.2
+WINDOW = 1 / 32  # cycle
+FEWEST_STEPS = 8  # of time stepping
+# Body lengths per cycle, below which there is no direction of travel.
+SMALLEST_TRAVEL = 1e-6
+SUBJECT = "force along the body"
+POWER = "drag x BL/rad"
+PLACE = "from tail 0 to head 1"
+NO_SIZES = Sizes()
+FIELD_DIMS = (("phase",), ("phase", "s"), ("phase", "point"))
+
+
+# The question `forces`.
 
 
 def check(scene: Scene, sizes: Sizes) -> None:
-    """Refuse sizes that contradict the scene, and a system without a body in a medium."""
+    """Refuse sizes that contradict the scene, and a system without a body in a
+    medium."""
     with located(scene.name):
-        newtons(scene, loaded(scene, WHAT), sizes)
+        force_unit(scene, loaded(scene, SUBJECT), sizes)
 
 
 def cost(scene: Scene) -> Cost:
@@ -47,7 +65,7 @@ def cost(scene: Scene) -> Cost:
     jobs = []
     for one in (scene, *_variants(scene)):
         phases = one.numerics.phases
-        jobs += direct(_divided(one), one.gait, 1, phases, checked=False)
+        jobs += direct(_subdivided(one), one.gait, 1, phases, checked=False)
     return price(jobs)
 
 
@@ -55,73 +73,75 @@ def answer(scene: Scene, sizes: Sizes) -> Result:
     """Return `forces` with errors, means over the cycle and largest values; the unit of
     force in words and whether the body travels as attributes."""
     with located(scene.name):
-        found, run = forces(scene, sizes)
-        found = with_errors(found, run)
-    facts = {"travels": int(run.travels), "drag_is": unit_words(run.newtons)}
-    more = [
-        *travel(run),
-        *means(found),
-        *powers(found),
+        found, cycle = forces(scene, sizes)
+        found = with_errors(found, cycle)
+    facts = {"travels": int(cycle.travels), "drag_is": unit_words(cycle.unit)}
+    scalars = [
+        *travel_variables(cycle),
+        *mean_forces(found),
+        *power_variables(found),
         *largest_moment(found),
-        *activation(found),
+        *activation_lags(found),
     ]
-    return Result("forces", (*more, *found.variables), facts)
+    return Result("forces", (*scalars, *found.variables), facts)
 
 
-def unit_words(unit: Newtons) -> str:
+def unit_words(unit: ForceUnit) -> str:
     """Return what the unit of force is."""
     if unit.drag is None:
-        sizes = ", ".join(unit.lacks)
+        sizes = ", ".join(unit.missing)
         return f"drag of the straight body along itself; give {sizes} for newtons"
-    words = f"drag of the straight body along itself {unit.drag:.4g} N, {unit.how}"
+    words = f"drag of the straight body along itself {unit.drag:.4g} N, {unit.source}"
     if unit.frequency:
         return words
     return f"{words}; give frequency for watts"
 
 
-def travel(run: Run) -> list[Variable]:
+def travel_variables(cycle: Cycle) -> list[Variable]:
     """Return the net distance of a cycle and its direction."""
-    unit = length_unit(run.scene.system)
-    distance = np.hypot(*run.net[:2])
+    unit = length_unit(cycle.scene.system)
+    distance = np.hypot(*cycle.net[:2])
     label = "of travel at mid-cycle, from the frame's heading at phase 0"
     return [
         Variable("net_distance", (), distance, unit, "net distance per cycle"),
-        Variable("direction", (), run.direction, "rad", label),
+        Variable("direction", (), cycle.direction, "rad", label),
     ]
 
 
-def mean(variable: Variable) -> tuple[float, float]:
-    """Return the mean of a variable and that of its error, 0 without one."""
+def mean_and_error(variable: Variable) -> tuple[float, float]:
+    """Return the mean of a variable and the mean of its error, 0 without one."""
+    mean = float(variable.values.mean())
     if variable.error is None:
-        return float(variable.values.mean()), 0.0
-    return float(variable.values.mean()), float(variable.error.mean())
+        return mean, 0.0
+    return mean, float(variable.error.mean())
 
 
-def means(found: Result) -> list[Variable]:
-    """Return the means over the cycle of thrust and drag, by part of the force and their
-    sum."""
+def mean_forces(found: Result) -> list[Variable]:
+    """Return the means over the cycle of thrust and drag, by part of the force and
+    their sum."""
     variables = [Variable("part", ("part",), [*PARTS, "sum"])]
     for side in SIDES:
-        of_parts = [found[f"{side}_{part}"] for part in PARTS]
-        values, errors = zip(*map(mean, of_parts))
+        parts = [found[f"{side}_{part}"] for part in PARTS]
+        values, errors = zip(*map(mean_and_error, parts))
         values = (*values, sum(values))
         errors = (*errors, sum(errors))
         label = f"mean {side} over the cycle"
-        unit = of_parts[0].unit
+        unit = parts[0].unit
         variables.append(Variable(side, ("part",), values, unit, label, errors))
     return variables
 
 
-def powers(found: Result) -> list[Variable]:
+def power_variables(found: Result) -> list[Variable]:
     """Return the mean and the largest power into the medium, and the mean at the
     joints."""
-    power, joints = found["medium_power"], found["joint_power"]
-    value, error = mean(power)
+    power = found["medium_power"]
+    joint_power = found["joint_power"]
+    mean, error = mean_and_error(power)
     largest = power.values.max()
-    at_joints = joints.values.mean()
+    at_joints = joint_power.values.mean()
     unit = power.unit
     return [
-        Variable("mean_power", (), value, unit, "into the medium", error),
+        Variable("mean_power", (), mean, unit, "into the medium", error),
         Variable("largest_power", (), largest, unit, "into the medium"),
         Variable("mean_joint_power", (), at_joints, unit, "of the joints"),
     ]
@@ -131,100 +151,128 @@ def largest_moment(found: Result) -> list[Variable]:
     """Return the largest bending moment, its place and its phase."""
     moment = found["bending_moment"]
     sizes = np.abs(moment.values)
-    phase, point = np.unravel_index(sizes.argmax(), sizes.shape)
+    k, point = np.unravel_index(sizes.argmax(), sizes.shape)
     s = found["point"].values[point]
-    at = found["phase"].values[phase]
+    phase = found["phase"].values[k]
     return [
-        Variable("largest_moment", (), sizes[phase, point], moment.unit, "bending"),
+        Variable("largest_moment", (), sizes[k, point], moment.unit, "bending"),
         Variable("largest_moment_s", (), s, "BL", "its place, from tail 0 to head 1"),
-        Variable("largest_moment_phase", (), at, "rad", "its phase"),
+        Variable("largest_moment_phase", (), phase, "rad", "its phase"),
     ]
 
 
-def activation(found: Result) -> list[Variable]:
-    """Return by how much activation is ahead of bending at some places of the body."""
-    joint, lag = found["joint"].values, found["fundamental_lag"].values
-    places = joint
-    if joint.size > len(PLACES):
+def activation_lags(found: Result) -> list[Variable]:
+    """Return the phase by which activation is ahead of bending, at the joints or, of
+    many joints, at PLACES."""
+    joints = found["joint"].values
+    places = joints
+    if joints.size > len(PLACES):
         places = np.array(PLACES)
-    ahead = np.interp(places, joint, lag)
+    lags = np.interp(places, joints, found["fundamental_lag"].values)
     label = "phase by which activation is ahead of curvature"
     return [
-        Variable("place", ("place",), places, "BL", "from tail 0 to head 1"),
-        Variable("lag_of_activation", ("place",), ahead, "rad", label),
+        Variable("place", ("place",), places, "BL", PLACE),
+        Variable("lag_of_activation", ("place",), lags, "rad", label),
     ]
 
 
-class Run(NamedTuple):
-    """A cycle in the direction of travel. net: (3,), pose after it. direction: rad, of travel at the middle of the cycle,
-    from the frame's heading at its start; 0 where the body does not travel. newtons: the unit of force. activation: as
-    `geomech.studies.undulation.activation`."""
+# Errors.
+
+
+class Cycle(NamedTuple):
+    """A cycle of a scene's gait, with its direction of travel.
+
+    net: (3,), pose after it. direction: rad, of travel at the middle of the cycle, from
+    the frame's heading at its start; 0 where the body does not travel. unit: of force.
+    activation: as `geomech.studies.undulation.activation`."""
 
     scene: Scene
     net: np.ndarray
     direction: float
-    newtons: Newtons
+    unit: ForceUnit
     activation: dict[str, Any]
 
     @property
     def travels(self) -> bool:
-        """Whether there is a direction of travel; else forwards is where the frame points to at phase 0."""
-        return bool(np.hypot(*self.net[:2]) > STILL * body_size(self.scene.system))
+        """Whether there is a direction of travel; else forwards is where the frame
+        points to at phase 0."""
+        smallest = SMALLEST_TRAVEL * body_size(self.scene.system)
+        return bool(np.hypot(*self.net[:2]) > smallest)
 
 
-def with_errors(result: Result, run: Run) -> Result:
-    """Return forces with errors: the changes with half the elements of a backbone, with
-    half the pieces into which effects cut a body, with a law computed more exactly, and in
-    time stepping with half the phases; the largest of each within NEAR of a phase, as
-    changes pass through zero. Errors of order 2 are a third of these changes; near stuck
-    links they scatter."""
+def with_errors(result: Result, cycle: Cycle) -> Result:
+    """Return forces with errors.
+
+    An error is the sum of changes: with half the elements of a backbone, with half the
+    pieces into which effects cut a body, with a law computed more exactly, and in time
+    stepping with half the phases. Of each change the largest within WINDOW of a phase
+    counts, as changes pass through zero. Errors of order 2 are a third of these
+    changes; near stuck links they scatter."""
     others = []
-    for other in _variants(run.scene):
-        found, _ = forces(other, unit=run.newtons)
+    for variant in _variants(cycle.scene):
+        found, _ = forces(variant, unit=cycle.unit)
         others.append(found)
-    variables = [_with_error(v, result, others) for v in result.variables]
+    variables = []
+    for variable in result.variables:
+        if variable.dims in FIELD_DIMS and not variable.is_coordinate:
+            error = _error(variable, result, others)
+            variable = replace(variable, error=error)
+        variables.append(variable)
     return replace(result, variables=tuple(variables))
 
 
-def _with_error(v: Variable, result: Result, others: list[Result]) -> Variable:
-    if (
-        v.dims not in (("phase",), ("phase", "s"), ("phase", "point"))
-        or v.is_coordinate
-    ):
-        return v
-    from scipy.interpolate import make_interp_spline
+def _error(variable: Variable, result: Result, others: list[Result]) -> np.ndarray:
+    """Return the sum of the changes of a variable of a result in other results."""
     from scipy.ndimage import maximum_filter1d
 
-    error = np.zeros_like(v.values)
+    error = np.zeros_like(variable.values)
+    phases = len(error)
     for other in others:
-        values = other[v.name].values
-        for place in v.dims[1:]:
-            values = make_interp_spline(other[place].values, values, 1, axis=1)(
-                result[place].values
-            )
-        change = SEEN * np.abs(v.values[:: len(error) // len(values)] - values)
-        near = maximum_filter1d(
-            change, 2 * round(NEAR * len(change)) + 1, axis=0, mode="wrap"
-        )
-        error += near if len(near) == len(error) else near.max(0)
-    return replace(v, error=error)
+        values = _at_places(variable, result, other)
+        same_phases = variable.values[:: phases // len(values)]
+        change = ERROR_OVER_CHANGE * np.abs(same_phases - values)
+        width = 2 * round(WINDOW * len(change)) + 1
+        largest = maximum_filter1d(change, width, axis=0, mode="wrap")
+        if len(largest) < phases:
+            # With half the phases: the largest change of the whole cycle.
+            largest = largest.max(0)
+        error += largest
+    return error
+
+
+def _at_places(variable: Variable, result: Result, other: Result) -> np.ndarray:
+    """Return a variable of another result, interpolated to the places of a result."""
+    from scipy.interpolate import make_interp_spline
+
+    values = other[variable.name].values
+    for dim in variable.dims[1:]:
+        spline = make_interp_spline(other[dim].values, values, 1, axis=1)
+        values = spline(result[dim].values)
+    return values
 
 
 def _variants(scene: Scene) -> list[Scene]:
-    """Return other approximations of a scene, coarser ones and one with its law computed more exactly."""
-    system, phases = loaded(scene, WHAT), scene.numerics.phases
+    """Return other approximations of a scene: coarser ones, and one with its law
+    computed more exactly."""
+    system = loaded(scene, SUBJECT)
+    phases = scene.numerics.phases
     scene = scene.changed(system=system)
-    variants = [scene.changed(system=finer) for finer in [refined(system)] if finer]
+    variants = []
+    finer = refined(system)
+    if finer:
+        variants.append(scene.changed(system=finer))
     variants += _with_fewer_elements(scene)
-    if pieces := pieces_per_length(system):
+    pieces = pieces_per_length(system)
+    if pieces:
         variants.append(scene.with_numerics(pieces=max(1, pieces // 2)))
-    if system.traits.steps and phases % 2 == 0 and phases >= 2 * LEAST_STEPS:
+    if system.traits.steps and phases % 2 == 0 and phases >= 2 * FEWEST_STEPS:
         variants.append(scene.with_numerics(phases=phases // 2))
     return variants
 
 
 def _with_fewer_elements(scene: Scene) -> list[Scene]:
-    """Return the scene of about half as many elements, of a continuous body and its gait, where it allows it."""
+    """Return the scene of a continuous body, and of its gait, with about half as many
+    elements; none for other bodies, or where it has too few."""
     system = scene.system
     other = next(iter(coarser(system)), None)
     if other is None or other.ratio < 1:
@@ -233,232 +281,217 @@ def _with_fewer_elements(scene: Scene) -> list[Scene]:
     return [scene.changed(system=other.system, gait=gait)]
 
 
-def _divided(scene: Scene) -> Scene:
-    """Return the scene with a body of short elements, so that forces are known along each link, too."""
-    return scene.changed(system=loaded(scene, WHAT).subdivided())
+def _subdivided(scene: Scene) -> Scene:
+    """Return the scene with a body of short elements, so that the forces along each
+    link are known as well."""
+    return scene.changed(system=loaded(scene, SUBJECT).subdivided())
+
+
+# Forces over a cycle.
 
 
 def forces(
-    scene: Scene, sizes: Sizes = UNKNOWN, unit: Newtons | None = None
-) -> tuple[Result, Run]:
+    scene: Scene, sizes: Sizes = NO_SIZES, unit: ForceUnit | None = None
+) -> tuple[Result, Cycle]:
     """Return forces, power, bending moments and activation over a cycle of the scene's
     gait, at its N phases, and the cycle.
 
-    Over the n elements, at least 40, or the n - 1 points between them, or the joints: positions s, 0 at the tail to 1 at the
-    head. `forward` and its two parts are components in the direction of travel, `normal` and `tangential` components to the
-    element's left and to its head. `thrust_*` and `drag_*` are sums over the body of what pushes and of what holds back,
-    `mean_thrust_*` and `mean_drag_*` means over the cycle. power: work against the medium; joint_power: of the bending
-    moments on the bends, which is the same but for the kinetic energy of a heavy body. Forces are in axial drags of the
-    straight body, or in N where its sizes are known. unit: that of forces, in place of sizes. Refusal for a system without a
-    body in a medium."""
-    system, gait = _divided(scene).system, scene.gait.cycle(scene.numerics.phases)
-    bent, elements = bends(loaded(scene, WHAT), *gait), system.elements(*gait)
-    cycle = system.run(*gait, work=True)
-    work = type(cycle.work)(*(x / system.axial_drag for x in cycle.work))
+    Variables have values over the n elements, at least 40, or the n - 1 points between
+    them, or the joints, at positions s: 0 at the tail to 1 at the head. `forward` and
+    its two parts are components in the direction of travel, `normal` and `tangential`
+    components to the element's left and to its head. `thrust_*` and `drag_*` are sums
+    over the body of the forces that push and of those that hold back; `mean_thrust_*`
+    and `mean_drag_*` are means over the cycle. power: work against the medium.
+    joint_power: work of the bending moments on the bends, which is the same but for the
+    kinetic energy of a heavy body. Forces are in axial drags of the straight body, or
+    in N where its sizes are known. unit: of force, in place of sizes. Refusal for a
+    system without a body in a medium."""
+    system = _subdivided(scene).system
+    alpha, alphadot = scene.gait.cycle(scene.numerics.phases)
+    elements = system.elements(alpha, alphadot)
+    run = system.run(alpha, alphadot, work=True)
+    work = _in_axial_drags(run.work, system.axial_drag)
     length = 2 * elements.half[:, 0]
     points = np.cumsum(length)[:-1]
-    moment = work.bending_moment[:, np.searchsorted(points, bent.s - 1e-9)]
-    pose = _poses(system, gait, cycle.xi)
-    unit = unit or newtons(scene, system, sizes)
-    run = Run(scene, pose[-1], _direction(pose[-1]), unit, activation_of(bent, moment))
-    ahead = (
-        _ahead(run, pose)[:, None] * (elements.c + 1j * elements.s).T
-    )  # elements, the real axis that of travel
-    of_ends = (
-        work.end_force[:, 0] * ahead[:, [0, -1]].real
-        - work.end_force[:, 1] * ahead[:, [0, -1]].imag
-    )
-    along, across = work.element_force[:, 0], work.element_force[:, 1]
-    parts = {
-        "normal": -across * ahead.imag,
-        "tangential": along * ahead.real,
-        "ends": of_ends,
-    }
+
+    # The joints of the scene's own body are some of the points of the subdivided one.
+    bent = bends(loaded(scene, SUBJECT), alpha, alphadot)
+    joints = np.searchsorted(points, bent.s - 1e-9)
+    moment = work.bending_moment[:, joints]
+    joint_power = (moment * bent.rate).sum(-1)
+
+    pose = _cycle_poses(system, alpha, alphadot, run.xi)
+    net = pose[-1]
+    if unit is None:
+        unit = force_unit(scene, system, sizes)
+    activation = activation_of_bends(bent, moment)
+    cycle = Cycle(scene, net, _direction(net), unit, activation)
+
+    headings = elements.c + 1j * elements.s
+    headings = _from_travel(cycle, pose)[:, None] * headings.T
+    forward = _forward_parts(work, headings)
     variables = [
         *_coordinates(len(pose) - 1, length, points, bent.s),
-        *_maps(parts, along, across, work, length),
-        *_by_phase(parts, work, (moment * bent.rate).sum(-1)),
-        *_by_place(parts, length),
-        *_of_joints(run.activation),
+        *_maps(forward, work, length),
+        *_phase_variables(forward, work, joint_power),
+        *_place_variables(forward, length),
+        *_joint_variables(activation),
     ]
-    converted = tuple(_converted(v, run.newtons) for v in variables)
-    return Result("forces", converted), run
+    return Result("forces", tuple(_in_si(v, unit) for v in variables)), cycle
 
 
-def _poses(
-    system: Any, gait: tuple[np.ndarray, np.ndarray], xi: np.ndarray
+def _in_axial_drags(work: Any, axial_drag: float) -> Any:
+    """Return the forces, moments and powers of a cycle over the body's axial drag."""
+    return type(work)(*(values / axial_drag for values in work))
+
+
+def _cycle_poses(
+    system: Any, alpha: np.ndarray, alphadot: np.ndarray, xi: np.ndarray
 ) -> np.ndarray:
-    """Return the poses (N + 1, 3) of the frame during a cycle of shapes and rates with body velocities (N, 3)."""
+    """Return the poses (N + 1, 3) of the frame during a cycle with body velocities
+    (N, 3)."""
     stepped = capability(system, Stepped)
     if stepped is None or not system.traits.lacks & Premise.SE2_SYMMETRIC:
         return poses(xi)
-    return stepped.path(*gait, 1)
+    return stepped.path(alpha, alphadot, 1)
 
 
 def _direction(net: np.ndarray) -> float:
+    """Return the direction of a net displacement, rad; 0 without one."""
     x, y, _ = net
-    return float(np.arctan2(y, x)) if np.hypot(x, y) > 0 else 0.0
+    if np.hypot(x, y) > 0:
+        return float(np.arctan2(y, x))
+    return 0.0
 
 
-def _ahead(run: Run, pose: np.ndarray) -> np.ndarray:
-    """Return the frame's heading (N,) as complex numbers whose real axis is the direction of travel."""
-    share = np.arange(len(pose) - 1) / (len(pose) - 1) - 0.5
-    travel = run.direction + share * run.net[2] if run.travels else 0.0
-    return np.exp(1j * (pose[:-1, 2] - travel))
+def _from_travel(cycle: Cycle, pose: np.ndarray) -> np.ndarray:
+    """Return the frame's heading (N,) from the direction of travel, as complex numbers
+    whose real axis is that direction."""
+    phases = len(pose) - 1
+    direction = 0.0
+    if cycle.travels:
+        from_middle = np.arange(phases) / phases - 0.5  # cycles
+        direction = cycle.direction + from_middle * cycle.net[2]
+    return np.exp(1j * (pose[:-1, 2] - direction))
+
+
+def _forward_parts(work: Any, headings: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the components in the direction of travel of the parts of the force: on
+    the elements (N, n), and on tail and head (N, 2).
+
+    headings: (N, n), of the elements, complex, from the direction of travel."""
+    along = work.element_force[:, 0]
+    across = work.element_force[:, 1]
+    end_along = work.end_force[:, 0]
+    end_across = work.end_force[:, 1]
+    ends = headings[:, [0, -1]]
+    return {
+        "normal": -across * headings.imag,
+        "tangential": along * headings.real,
+        "ends": end_along * ends.real - end_across * ends.imag,
+    }
+
+
+# Variables.
 
 
 def _coordinates(
     phases: int, length: np.ndarray, points: np.ndarray, joints: np.ndarray
 ) -> list[Variable]:
-    place = "from tail 0 to head 1"
+    phase = 2 * np.pi * np.arange(phases) / phases
+    centres = np.cumsum(length) - length / 2
+    between = f"points between elements, {PLACE}"
     return [
-        Variable(
-            "phase",
-            ("phase",),
-            2 * np.pi * np.arange(phases) / phases,
-            "rad",
-            "phase of the gait",
-        ),
-        Variable(
-            "s",
-            ("s",),
-            np.cumsum(length) - length / 2,
-            "BL",
-            f"centres of elements, {place}",
-        ),
-        Variable(
-            "point", ("point",), points, "BL", f"points between elements, {place}"
-        ),
-        Variable("joint", ("joint",), joints, "BL", f"joints, {place}"),
+        Variable("phase", ("phase",), phase, "rad", "phase of the gait"),
+        Variable("s", ("s",), centres, "BL", f"centres of elements, {PLACE}"),
+        Variable("point", ("point",), points, "BL", between),
+        Variable("joint", ("joint",), joints, "BL", f"joints, {PLACE}"),
         Variable("length", ("s",), length, "BL", "length of each element"),
     ]
 
 
-def _maps(
-    parts: dict, along: np.ndarray, across: np.ndarray, work: Any, length: np.ndarray
-) -> list[Variable]:
-    dims, density = ("phase", "s"), "drag/BL"
-    of = lambda name, values, label: Variable(
-        name, dims, values / length, density, f"{label}, per length of body"
-    )
+def _maps(forward: dict, work: Any, length: np.ndarray) -> list[Variable]:
+    """Return the forces, power and moments over phase and place."""
+
+    def density(name, values, label, unit="drag/BL"):
+        label = f"{label}, per length of body"
+        return Variable(name, ("phase", "s"), values / length, unit, label)
+
+    normal = forward["normal"]
+    tangential = forward["tangential"]
+    along = work.element_force[:, 0]
+    across = work.element_force[:, 1]
+    power = work.element_power
     return [
-        of(
-            "forward",
-            parts["normal"] + parts["tangential"],
-            "force in the direction of travel",
-        ),
-        of("forward_normal", parts["normal"], "its part by forces across the body"),
-        of(
-            "forward_tangential",
-            parts["tangential"],
-            "its part by forces along the body",
-        ),
-        of("normal", across, "force across the body, to its left"),
-        of("tangential", along, "force along the body, to its head"),
-        replace(
-            of("power", work.element_power, "work against the medium"), unit="drag/rad"
-        ),
+        density("forward", normal + tangential, "force in the direction of travel"),
+        density("forward_normal", normal, "its part by forces across the body"),
+        density("forward_tangential", tangential, "its part by forces along the body"),
+        density("normal", across, "force across the body, to its left"),
+        density("tangential", along, "force along the body, to its head"),
+        density("power", power, "work against the medium", "drag/rad"),
         Variable(
-            "bending_moment",
-            ("phase", "point"),
-            work.bending_moment,
-            "drag x BL",
+            "bending_moment", ("phase", "point"), work.bending_moment, "drag x BL",
             "positive where the left side works",
         ),
+    ]  # fmt: skip
+
+
+def _phase_variables(
+    forward: dict, work: Any, joint_power: np.ndarray
+) -> list[Variable]:
+    """Return the forces and powers of the whole body over phase."""
+    over = ("phase",)
+    found = []
+    for kind, (side, words) in SIDES.items():
+        for part, values in forward.items():
+            total = side(values, 0.0).sum(-1)
+            label = f"sum of {part} forces {words}"
+            found.append(Variable(f"{kind}_{part}", over, total, "drag", label))
+    for end, values in zip(("tail", "head"), forward["ends"].T):
+        label = f"force on the {end} in the direction of travel"
+        found.append(Variable(f"{end}_forward", over, values, "drag", label))
+    power = work.element_power.sum(-1) + work.end_power.sum(-1)
+    of_moments = "work of the bending moments at the joints"
+    found += [
+        Variable("medium_power", over, power, POWER, "work against the medium"),
+        Variable("joint_power", over, joint_power, POWER, of_moments),
     ]
+    return found
 
 
-SIDES = {
-    "thrust": (np.maximum, "forwards"),
-    "drag": (np.minimum, "backwards"),
-}  # what pushes, and what holds back
+def _place_variables(forward: dict, length: np.ndarray) -> list[Variable]:
+    """Return the means over the cycle of thrust and drag along the body."""
+    found = []
+    for kind, (side, words) in SIDES.items():
+        for part in FLANK:
+            mean = side(forward[part], 0.0).mean(0) / length
+            label = f"mean over the cycle of {part} forces {words}, per length of body"
+            found.append(
+                Variable(f"mean_{kind}_{part}", ("s",), mean, "drag/BL", label)
+            )
+    return found
 
 
-def _by_phase(parts: dict, work: Any, joint_power: np.ndarray) -> list[Variable]:
-    dims, total = ("phase",), work.element_power.sum(-1) + work.end_power.sum(-1)
-    sums = [
-        Variable(
-            f"{kind}_{name}",
-            dims,
-            side(x, 0.0).sum(-1),
-            "drag",
-            f"sum of {name} forces {words}",
-        )
-        for kind, (side, words) in SIDES.items()
-        for name, x in parts.items()
-    ]
-    of_ends = [
-        Variable(
-            f"{end}_forward",
-            dims,
-            parts["ends"][:, k],
-            "drag",
-            f"force on the {end} in the direction of travel",
-        )
-        for k, end in enumerate(("tail", "head"))
-    ]
-    powers = [
-        Variable("medium_power", dims, total, WORK, "work against the medium"),
-        Variable(
-            "joint_power",
-            dims,
-            joint_power,
-            WORK,
-            "work of the bending moments at the joints",
-        ),
-    ]
-    return [*sums, *of_ends, *powers]
-
-
-def _by_place(parts: dict, length: np.ndarray) -> list[Variable]:
-    label = "mean over the cycle of {} forces {}, per length of body"
-    return [
-        Variable(
-            f"mean_{kind}_{name}",
-            ("s",),
-            side(parts[name], 0.0).mean(0) / length,
-            "drag/BL",
-            label.format(name, words),
-        )
-        for kind, (side, words) in SIDES.items()
-        for name in FLANK
-    ]
-
-
-def _of_joints(activation: dict[str, Any]) -> list[Variable]:
+def _joint_variables(activation: dict[str, Any]) -> list[Variable]:
+    """Return bends and activation at the joints."""
+    ahead = "phase by which activation is ahead of curvature"
     labels = {
-        "lag": "phase by which activation is ahead of curvature, by changes of sign",
-        "fundamental_lag": "phase by which activation is ahead of curvature, by the first harmonic",
+        "lag": f"{ahead}, by changes of sign",
+        "fundamental_lag": f"{ahead}, by the first harmonic",
         "onset": "phase at which the right side begins to work",
         "offset": "phase at which the right side ends to work",
     }
-    variables = [
-        Variable(name, ("joint",), activation[name], "rad", label)
-        for name, label in labels.items()
-    ]
-    variables += [
-        Variable(
-            name,
-            (),
-            activation[name],
-            "1",
-            "speed of the wave of activation over that of curvature",
-        )
-        for name in ("speed_ratio", "fundamental_speed_ratio")
-    ]
-    return [
-        Variable(
-            "bend",
-            ("phase", "joint"),
-            activation["bend"],
-            "rad",
-            "positive to the left",
-        ),
-        *variables,
-    ]
+    bend = activation["bend"]
+    found = [Variable("bend", ("phase", "joint"), bend, "rad", "positive to the left")]
+    for name, label in labels.items():
+        found.append(Variable(name, ("joint",), activation[name], "rad", label))
+    label = "speed of the wave of activation over that of curvature"
+    for name in ("speed_ratio", "fundamental_speed_ratio"):
+        found.append(Variable(name, (), activation[name], "1", label))
+    return found
 
 
-def _converted(v: Variable, unit: Newtons) -> Variable:
+def _in_si(variable: Variable, unit: ForceUnit) -> Variable:
     """Return a variable in SI units, where these are known."""
-    factor, name = unit.convert(v.unit)
-    return replace(v, values=v.values * factor, unit=name)
+    factor, name = unit.convert(variable.unit)
+    return replace(variable, values=variable.values * factor, unit=name)

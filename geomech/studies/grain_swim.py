@@ -1,9 +1,9 @@
-"""A scene's body of rigid links that swims in a bed of grains, beside what the tiers of
-resistive force theory predict."""
+"""A scene's body of rigid links that swims in a bed of grains, beside the predictions
+of the tiers of resistive force theory."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +15,7 @@ from geomech.core.variables import Result, Variable
 from geomech.run.backend import prefer_backend
 from geomech.scenes.model import Scene
 from geomech.studies.calibration import rod_fit
-from geomech.studies.grains import GrainSteps, price, store_folder
+from geomech.studies.grains import GrainSteps, grain_cost, store_folder
 from geomech.studies.scene_tables import SceneTables
 from geomech.systems.base import body_size
 from geomech.systems.swimmer import Swimmer
@@ -29,11 +29,12 @@ from rft.grains.motions import Swim
 from rft.grains.spheres import chain
 
 RAMP = 0.5  # cycles in which the gait grows from the straight body
-# Of a scene that gives none: those of the rod of the sample `FLANK`.
+# Of a scene without its own: those of the rod of the sample `FLANK`.
 SIZE = 0.162  # m
 RADIUS = 6e-3  # m
-FREQUENCY = 1.0  # Hz
-ROOM = (0.118, 0.078)  # m of bed beyond the body along and across it
+FREQUENCY = 1.0  # Hz, assumed
+MARGIN_ALONG = 0.118  # m of bed beyond the body
+MARGIN_ACROSS = 0.078  # m of bed beyond the body
 DEPTH = 0.049  # m of bed, or as much as a thick body takes
 FLANK = "flank-drag"  # the sample of drag in such beds
 GRAINS_LAW = "law of grains"
@@ -43,9 +44,9 @@ Progress = Callable[[float], None]
 
 
 class Predicted(NamedTuple):
-    """The displacement of a cycle by a method: x and y in body lengths, heading in rad
-    (3,). error, spread: estimate, and what the uncertain medium or the cycles in grains
-    leave; nan where it is not known."""
+    """The displacement of a cycle by a method (3,): x and y in body lengths, heading in
+    rad. error: estimated. spread: standard deviation by an uncertain medium, or of the
+    cycles in grains. Both are nan where they are not known."""
 
     values: np.ndarray
     error: np.ndarray
@@ -56,7 +57,9 @@ class Predicted(NamedTuple):
         """Net distance with its error and spread, body lengths."""
         x, y = self.values[:2]
         distance = np.hypot(x, y)
-        slope = self.values[:2] / distance if distance > 0 else np.ones(2)
+        slope = np.ones(2)  # of the distance over x and y
+        if distance > 0:
+            slope = self.values[:2] / distance
         error = np.hypot(*(slope * self.error[:2]))
         spread = np.hypot(*(slope * self.spread[:2]))
         return float(distance), float(error), float(spread)
@@ -64,13 +67,13 @@ class Predicted(NamedTuple):
 
 @dataclass(frozen=True)
 class GrainSwim:
-    """A swimmer of rigid links in a bed of grains, for some cycles of its gait after it has
-    grown from the straight body.
+    """A swimmer of rigid links in a bed of grains, for some cycles of its gait after
+    the gait has grown from the straight body.
 
-    cycles: how many. seed: of the bed. size, radius (m): of the body; by default the
-    scene's length and the radius of its end caps, or `SIZE` and `RADIUS` where the scene
-    is in body lengths. depth (m): of its axis, half of the bed's if None. store: folder of
-    beds and runs."""
+    cycles: their number. seed: of the bed. size, radius (m): of the body; by default
+    the scene's length and the radius of its end caps, or `SIZE` and `RADIUS` where the
+    scene is in body lengths. depth (m): of its axis, half of the bed's if None. store:
+    folder of beds and runs."""
 
     scene: Scene
     cycles: int = 2
@@ -99,10 +102,9 @@ class GrainSwim:
 
     @cached_property
     def experiment(self) -> Experiment:
+        """The bed, the body and its motion."""
         body = self.swimmer.body
-        size = self.size
-        if size is None:
-            size = SIZE if body.length is None else body.length
+        size = self._size()
         require(0 < size < np.inf, "length must be > 0", value=size)
         radius = self._radius(size)
         require(
@@ -110,11 +112,12 @@ class GrainSwim:
             "radius must be > 0 and below half of the length",
             value=radius,
         )
+
         bed = Bed(seed=self.seed)
         bed = replace(
             bed,
-            length=round(size + ROOM[0], 6),
-            width=round(size + ROOM[1], 6),
+            length=round(size + MARGIN_ALONG, 6),
+            width=round(size + MARGIN_ACROSS, 6),
             depth=max(DEPTH, round(2 * radius + 6 * bed.diameter, 6)),
         )
         gait = self.scene.gait
@@ -122,6 +125,15 @@ class GrainSwim:
         swim = Swim(gait.shape, gait.rate, f, RAMP / f, -2 * np.pi * RAMP)
         seconds = (RAMP + self.cycles) / f
         return Experiment(bed, chain(body, size, radius), swim, seconds, self.depth)
+
+    def _size(self) -> float:
+        """Return the length of the body, m."""
+        own_size = self.swimmer.body.length
+        if self.size is not None:
+            return self.size
+        if own_size is not None:
+            return own_size
+        return SIZE
 
     def _radius(self, size: float) -> float:
         """Return the radius, m, of a body of a size, m."""
@@ -135,7 +147,8 @@ class GrainSwim:
         return RADIUS
 
     def check(self) -> None:
-        """Refuse what no bed takes."""
+        """Refuse scenes and sizes that no bed takes, and beds without the engine of
+        grains."""
         require(1 <= self.cycles <= 1000, "cycles must be 1 to 1000", value=self.cycles)
         with located(self.scene.name):
             self.experiment.check()
@@ -143,41 +156,46 @@ class GrainSwim:
         store_folder(self.store)
 
     def cost(self) -> GrainSteps:
-        return price([self.experiment], store_folder(self.store))
+        return grain_cost([self.experiment], store_folder(self.store))
 
     def answer(self, progress: Progress) -> Result:
-        """Return the displacement by every tier and in grains, and the motion in time."""
+        """Return the displacement by every tier and in grains, and the motion in
+        time."""
         # Before the grains: a scene that no tier takes is refused at once.
         balances = SceneTables(self.scene).cost([self.scene.gait.amplitude]).as_balances
         with prefer_backend(balances):
-            tiers = predictions(self)
+            by_tier = predictions(self)
         run = self.experiment.run(store_folder(self.store), progress)
-        return result(self, run, tiers)
+        return swim_result(self, run, by_tier)
 
 
-def result(question: GrainSwim, run: Run, tiers: dict[str, Predicted]) -> Result:
+def swim_result(question: GrainSwim, run: Run, by_tier: dict[str, Predicted]) -> Result:
     """Return the displacement by method and by cycle, and the motion in time."""
     size = question.experiment.body.size
     starts = (RAMP + np.arange(question.cycles + 1)) / question.frequency
     poses = cycle_poses(run, starts) / [size, size, 1.0]
     unknown = np.full(3, np.nan)
-    scatter = poses.std(0, ddof=1) if len(poses) > 1 else unknown
-    methods = {**tiers, GRAINS: Predicted(poses.mean(0), unknown, scatter)}
+    scatter = unknown
+    if len(poses) > 1:
+        scatter = poses.std(0, ddof=1)
+    methods = {**by_tier, GRAINS: Predicted(poses.mean(0), unknown, scatter)}
     facts = {"seed": question.seed, **run.facts}
     variables = [
-        *_scalars(question, run, starts),
-        *_methods(methods),
-        *_cycles(poses),
-        *_motion(run),
-        *_outlines(question, run, [0.0, *starts]),
+        *_scalar_variables(question, run, starts),
+        *_method_variables(methods),
+        *_cycle_variables(poses),
+        *_motion_variables(run),
+        *_outline_variables(question, run, [0.0, *starts]),
     ]
     return Result("grains", tuple(variables), facts)
 
 
-def _scalars(question: GrainSwim, run: Run, starts: np.ndarray) -> list[Variable]:
+def _scalar_variables(
+    question: GrainSwim, run: Run, starts: np.ndarray
+) -> list[Variable]:
     body = question.experiment.body
-    ends = np.interp(starts[[0, -1]], run.t, run.work)
-    work = float((ends[1] - ends[0]) / question.cycles)
+    begin, end = np.interp(starts[[0, -1]], run.t, run.work)
+    work = float((end - begin) / question.cycles)
     overlap = float(run.overlaps[:, 0].max())
     return [
         Variable("body_length", (), body.size, "m"),
@@ -189,7 +207,7 @@ def _scalars(question: GrainSwim, run: Run, starts: np.ndarray) -> list[Variable
     ]
 
 
-def _methods(methods: dict[str, Predicted]) -> list[Variable]:
+def _method_variables(methods: dict[str, Predicted]) -> list[Variable]:
     """Return the displacement of a cycle by each method."""
     found = [Variable("method", ("method",), np.array([*methods]))]
     for k, (name, unit) in enumerate(UNITS.items()):
@@ -199,16 +217,16 @@ def _methods(methods: dict[str, Predicted]) -> list[Variable]:
         found.append(
             Variable(name, ("method",), values, unit, "per cycle", error, spread)
         )
-    distance = np.array([one.distance for one in methods.values()]).T
+    distance, error, spread = np.array([one.distance for one in methods.values()]).T
     found.append(
         Variable(
-            "net_distance", ("method",), distance[0], "BL", "per cycle", *distance[1:]
+            "net_distance", ("method",), distance, "BL", "per cycle", error, spread
         )
     )
     return found
 
 
-def _cycles(poses: np.ndarray) -> list[Variable]:
+def _cycle_variables(poses: np.ndarray) -> list[Variable]:
     """Return the displacement of each cycle in grains."""
     found = [Variable("cycle", ("cycle",), np.arange(1, len(poses) + 1))]
     for k, (name, unit) in enumerate(UNITS.items()):
@@ -217,8 +235,9 @@ def _cycles(poses: np.ndarray) -> list[Variable]:
     return found
 
 
-def _motion(run: Run) -> list[Variable]:
-    """Return the motion in time: pose of the frame, shape, force of the grains, work."""
+def _motion_variables(run: Run) -> list[Variable]:
+    """Return the motion in time: pose of the frame, shape, force of the grains,
+    work."""
     columns = [
         ("frame_x", run.pose[:, 0], "m", "of the body frame"),
         ("frame_y", run.pose[:, 1], "m", "of the body frame"),
@@ -240,7 +259,9 @@ def _motion(run: Run) -> list[Variable]:
     return found
 
 
-def _outlines(question: GrainSwim, run: Run, times: list[float]) -> list[Variable]:
+def _outline_variables(
+    question: GrainSwim, run: Run, times: list[float]
+) -> list[Variable]:
     """Return the body at some times, and the track of its frame, in body lengths."""
     size = question.experiment.body.size
     body = question.swimmer.body
@@ -263,8 +284,8 @@ def _outlines(question: GrainSwim, run: Run, times: list[float]) -> list[Variabl
 
 
 def cycle_poses(run: Run, starts: np.ndarray) -> np.ndarray:
-    """Return the net displacement (cycles, 3) between successive times, x and y in m in the
-    frame at the start of each."""
+    """Return the net displacement (cycles, 3) between successive times, x and y in m in
+    the frame at the start of each."""
     pose = np.column_stack([np.interp(starts, run.t, run.pose[:, k]) for k in range(3)])
     dx, dy, dtheta = np.diff(pose, axis=0).T
     theta = pose[:-1, 2]
@@ -273,41 +294,46 @@ def cycle_poses(run: Run, starts: np.ndarray) -> np.ndarray:
 
 
 def predictions(question: GrainSwim) -> dict[str, Predicted]:
-    """Return what the tiers of the scene predict, and the direct tier with the law and the
-    ends of the sample `FLANK`."""
+    """Return the predictions by the tiers of the scene, and by the direct tier with the
+    law and the ends of the sample `FLANK`, under `GRAINS_LAW`."""
     scene = question.scene
-    found = dict(_predicted(scene))
+    found = _tier_predictions(scene)
     body = question.experiment.body
     law = rod_fit(FLANK, end_caps="fitted")
     caps = law.caps(body.half_width / body.size)
     caps = caps.in_metres(question.swimmer.body.length)
     others = [e for e in question.swimmer.effects if not isinstance(e, EndCaps)]
     system = replace(question.swimmer, medium=law.medium, effects=(*others, caps))
-    of_grains = dict(_predicted(scene.changed(system=system), ("direct",)))
-    found[GRAINS_LAW] = of_grains["direct"]
+    by_grains_law = _tier_predictions(scene.changed(system=system), ("direct",))
+    found[GRAINS_LAW] = by_grains_law["direct"]
     return found
 
 
-def _predicted(
+def _tier_predictions(
     scene: Scene, tiers: tuple[str, ...] | None = None
-) -> Iterator[tuple[str, Predicted]]:
-    """Yield (tier, its prediction) of a scene's own gait."""
-    table = SceneTables(scene).displacements([scene.gait.amplitude], tiers)
+) -> dict[str, Predicted]:
+    """Return the displacement of a scene's own gait by tier."""
+    amplitude = scene.gait.amplitude
+    table = SceneTables(scene).displacements([amplitude], tiers)
     length = table.attributes["body_length"]
     units = np.array([length, length, 1.0])
+    found = {}
     for tier in table["tier"].values.tolist():
-        one = table.at(tier=tier, amplitude=scene.gait.amplitude)
-        values, errors, spreads = [], [], []
+        one = table.at(tier=tier, amplitude=amplitude)
+        values = []
+        errors = []
+        spreads = []
         for name in UNITS:
-            values.append(float(one[name].values))
-            errors.append(float(one[name].error))
-            known = one[name].spread is not None
-            spreads.append(float(one[name].spread) if known else 0.0)
-        yield (
-            tier,
-            Predicted(
-                np.array(values) / units,
-                np.array(errors) / units,
-                np.array(spreads) / units,
-            ),
+            variable = one[name]
+            values.append(float(variable.values))
+            errors.append(float(variable.error))
+            spread = 0.0
+            if variable.spread is not None:
+                spread = float(variable.spread)
+            spreads.append(spread)
+        found[tier] = Predicted(
+            np.array(values) / units,
+            np.array(errors) / units,
+            np.array(spreads) / units,
         )
+    return found

@@ -1,5 +1,5 @@
-"""The drag of grains on the flank and on the ends of a rod (`rft.grains`), and the law that
-is fitted to it."""
+"""The drag of grains on the flank and on the ends of a rod (`rft.grains`), and the law
+that is fitted to it."""
 
 from __future__ import annotations
 
@@ -25,8 +25,7 @@ from rft.grains.motions import Tow
 from rft.grains.spheres import Spheres, rod
 from rft.laws.drag import Rod, rod_drag
 
-# Steps of a grain per second; 1.9e6 measured on one core of the machine that this was
-# written on.
+# Steps of a grain per second; 1.9e6 measured on one core.
 RATE = 1.8e6
 LONGEST = 600.0  # s of computing that a command begins without consent
 # Half widths that a rod is dragged, without the first `UNSTEADY_TRAVEL`.
@@ -37,8 +36,9 @@ Progress = Callable[[float], None]
 class GrainSteps(Cost):
     """Cost of grains; balances counts the steps of all grains."""
 
-    # Grains solve no balances of forces. What is left of them depends on the store, and
-    # with it would the back end of the tiers beside them, and their last digits.
+    # Grains solve no balances of forces. If their remaining steps counted, which depend
+    # on the store, so would the back end of the tiers beside them, and their last
+    # digits.
     as_balances = 0.0
 
     def __str__(self) -> str:
@@ -46,23 +46,24 @@ class GrainSteps(Cost):
         return f"{self.balances:.1e} steps of grains, about {seconds} of computing"
 
     def check(self, place: str, yes: bool, less: str = "ask for less") -> None:
-        if not yes and self.seconds > LONGEST:
-            raise TooLong(
-                str(self),
-                where=place,
-                instead=f"to compute for more than {duration(LONGEST)} say ``yes``, "
-                f"or {less}",
-            )
+        if yes or self.seconds <= LONGEST:
+            return
+        longest = duration(LONGEST)
+        raise TooLong(
+            str(self),
+            where=place,
+            instead=f"to compute for more than {longest} say ``yes``, or {less}",
+        )
 
 
-def price(experiments: Sequence[Experiment], store: Path) -> GrainSteps:
-    """Return the cost of experiments, as far as their settled beds and runs are not in a
-    store."""
+def grain_cost(experiments: Sequence[Experiment], store: Path) -> GrainSteps:
+    """Return the cost of experiments, as far as their settled beds and runs are not in
+    a store."""
     steps = 0.0
     unsettled = {}
     for experiment in experiments:
-        steps_left = experiment.steps_left(store)
-        steps += experiment.grain_steps * steps_left / experiment.n_steps
+        remaining = experiment.steps_left(store)
+        steps += experiment.grain_steps * remaining / experiment.n_steps
         if not experiment.is_settled(store):
             unsettled[experiment.bed] = experiment
     for experiment in unsettled.values():
@@ -72,8 +73,8 @@ def price(experiments: Sequence[Experiment], store: Path) -> GrainSteps:
 
 
 def store_folder(given: Path | None) -> Path:
-    """Return the folder of settled beds and runs: the one given, else that in the user's
-    cache folder."""
+    """Return the folder of settled beds and runs: the one given, else that in the
+    user's cache folder."""
     if given is not None:
         return Path(given)
     folder = cache_folder()
@@ -90,8 +91,8 @@ class DraggedRod:
     """A round rod that is dragged through beds of grains at several attack angles.
 
     length, radius (m): of the rod, from end to end. angles: between velocity and axis,
-    degrees, 0 to 90. beds: how many, with seeds from ``seed`` on. speed (m/s). depth (m):
-    of the axis below the surface, half of the bed's if None."""
+    degrees, 0 to 90. beds: their number, with seeds from ``seed`` on. speed (m/s).
+    depth (m): of the axis below the surface, half of the bed's if None."""
 
     length: float
     radius: float
@@ -118,10 +119,10 @@ class DraggedRod:
         return found
 
     def check(self) -> None:
-        """Refuse sizes that make no sense."""
+        """Refuse sizes that make no sense, and beds without the engine of grains."""
         angles = list(self.angles)
-        few = len(set(angles)) < 3
-        require(not few, "a law takes three angles or more", value=angles)
+        enough = len(set(angles)) >= 3
+        require(enough, "a law takes three angles or more", value=angles)
         require(
             all(0 <= psi <= 90 for psi in angles),
             "angles must be 0 to 90 degrees",
@@ -139,21 +140,22 @@ class DraggedRod:
         load_lammps()
 
     def cost(self, store: Path) -> GrainSteps:
-        return price(self.experiments(), store)
+        return grain_cost(self.experiments(), store)
 
     def answer(self, store: Path, progress: Progress) -> Result:
-        """Return the drag in every bed, its mean, and the law of the flank with the drag on
-        the ends."""
+        """Return the drag in every bed, its mean, and the law of the flank with the
+        drag on the ends."""
         experiments = self.experiments()
         first_of_bed = experiments[:: len(self.angles)]
         n_tasks = len(first_of_bed) + len(experiments)
-        seconds_each = price(experiments, store).seconds / n_tasks
-        share = 1.0 / (1 + len(self.angles))  # of the settling in the progress
+        seconds_each = grain_cost(experiments, store).seconds / n_tasks
+        # Beds are settled first, as one run of an angle each in the progress.
+        share = 1.0 / (1 + len(self.angles))
 
-        def settled(done: float) -> None:
+        def report_settling(done: float) -> None:
             progress(share * done)
 
-        def dragged(done: float) -> None:
+        def report_drags(done: float) -> None:
             progress(share + (1 - share) * done)
 
         beds = runner().map(
@@ -162,7 +164,7 @@ class DraggedRod:
             first_of_bed,
             len(first_of_bed),
             seconds_each * len(first_of_bed),
-            settled,
+            report_settling,
         )
         packing, surface = np.array(list(beds)).mean(0)
         drags = runner().map(
@@ -171,7 +173,7 @@ class DraggedRod:
             experiments,
             len(experiments),
             seconds_each * len(experiments),
-            dragged,
+            report_drags,
         )
         rows = np.array(list(drags)).reshape(self.beds, len(self.angles), -1)
         depth = float(surface - experiments[0].height)
@@ -180,19 +182,26 @@ class DraggedRod:
     def _result(self, packing: float, depth: float, rows: np.ndarray) -> Result:
         """Return the result. packing, depth (m): means over beds. rows: (beds, angles,
         numbers of `_drag`)."""
-        r = np.moveaxis(rows, -1, 0)
-        drags = Drag(r[:2], r[2:4], r[4], r[5:7], r[7:9], r[9])
-        overlap = float(r[10].max())
+        columns = np.moveaxis(rows, -1, 0)
+        drags = Drag(
+            columns[:2],
+            columns[2:4],
+            columns[4],
+            columns[5:7],
+            columns[7:9],
+            columns[9],
+        )
+        overlap = float(columns[10].max())
         law = self.law(drags, packing, depth)
         facts = {
             "beds": self.beds,
             "grains": int(rows[0, 0, 12]),
             "lammps": int(rows[0, 0, 11]),
             "law": law.law,
-            "drag_about": self.about(packing, depth, overlap, rows),
+            "drag_about": self.file_head(packing, depth, overlap, rows),
         }
         over = ("bed", "attack_angle")
-        both = ("component", *over)
+        by_component = ("component", *over)
         in_time = "standard error in time"
         psi = np.tile(self.angles, self.beds)
         variables = [
@@ -201,11 +210,11 @@ class DraggedRod:
                 "attack_angle", ("attack_angle",), np.array(self.angles), "degrees"
             ),
             Variable(
-                "flank", both, drags.flank, "N/m", "drag on the flank",
+                "flank", by_component, drags.flank, "N/m", "drag on the flank",
                 drags.flank_error, error_label=in_time,
             ),
             Variable(
-                "ends", both, drags.ends, "N", "drag on both ends beyond that",
+                "ends", by_component, drags.ends, "N", "drag on both ends beyond that",
                 drags.ends_error, error_label=in_time,
             ),
             Variable(
@@ -225,19 +234,21 @@ class DraggedRod:
         return Result("drag_grains", tuple(variables), facts)
 
     def law(self, drags: Drag, packing: float, depth: float) -> Fit:
-        """Return the granular law of the flank with e of the ends, fitted to all beds."""
+        """Return the granular law of the flank with e of the ends, fitted to all
+        beds."""
         psi = np.tile(self.angles, self.beds)
         flank = self.length * drags.flank.reshape(2, -1)
         ends = drags.ends.reshape(2, -1)
         size = Rod(self.radius, self.length, depth, packing * self.bed.density)
         return fit("granular", rod_drag(psi, *flank, ends=ends), size, "fitted")
 
-    def about(
+    def file_head(
         self, packing: float, depth: float, overlap: float, rows: np.ndarray
     ) -> str:
-        """Return what a file of the drag says above its columns, which gives a fit of the
-        medium its sizes."""
-        bed, mm = self.bed, 1e3
+        """Return the head of a file of the drag. A fit of the medium reads its sizes
+        from it."""
+        bed = self.bed
+        mm = 1e3  # per m
         walls = "walled" if bed.walled else "periodic"
         friction = f"friction {bed.friction:g}"
         if bed.settling_friction is not None:
@@ -251,27 +262,27 @@ class DraggedRod:
             f"{2 * mm * self.radius:g} mm diameter x {mm * self.length:g} mm, axis "
             f"{mm * depth:.2f} mm deep, {self.speed:g} m/s",
             f"young {bed.young:g} Pa, poisson {bed.poisson:g}, restitution "
-            f"{bed.restitution:g}; {friction}, with the rod {bed.body_friction:g}, with "
-            f"the floor {bed.floor_friction:g}",
+            f"{bed.restitution:g}; {friction}, with the rod {bed.body_friction:g}, "
+            f"with the floor {bed.floor_friction:g}",
             f"{int(rows[0, 0, 12])} grains in {mm * bed.length:g} mm by "
-            f"{mm * bed.width:g} mm, {walls}; time step {1e6 * bed.step:.3g} us; largest "
-            f"overlap {overlap:.3f} of a grain",
+            f"{mm * bed.width:g} mm, {walls}; time step {1e6 * bed.step:.3g} us; "
+            f"largest overlap {overlap:.3f} of a grain",
             "errors: standard errors in time",
         ]
         return "\n".join(lines)
 
 
 def mean_over_beds(variable: Variable) -> Variable:
-    """Return the mean of a drag over beds. Its error is the standard error of that mean, or
-    the one in time where there is one bed."""
+    """Return the mean of a drag over beds. Its error is the standard error of that
+    mean, or the one in time where there is one bed."""
     axis = variable.dims.index("bed")
     beds = variable.values.shape[axis]
     if beds > 1:
         error = variable.values.std(axis, ddof=1) / np.sqrt(beds)
-        words = "standard error over beds"
+        error_label = "standard error over beds"
     else:
         error = variable.error.take(0, axis)
-        words = variable.error_label
+        error_label = variable.error_label
     return replace(
         variable,
         name=f"mean_{variable.name}",
@@ -279,13 +290,13 @@ def mean_over_beds(variable: Variable) -> Variable:
         values=variable.values.mean(axis),
         label=f"{variable.label}, mean over beds",
         error=error,
-        error_label=words,
+        error_label=error_label,
     )
 
 
 def _settle(folder: Path, experiment: Experiment) -> list[float]:
-    """Return packing and surface (m) of the bed of an experiment, settled where it is not
-    in the folder."""
+    """Return packing and surface (m) of the bed of an experiment, settled where it is
+    not in the folder."""
     bed = settle(experiment.bed, experiment.body, experiment.height, folder)
     return [bed.facts["packing"], bed.facts["surface"]]
 

@@ -1,5 +1,5 @@
-"""Forces and moments on a body that is moved through grains, with errors, and the accuracy study of these: error
-against the number of elements or triangles, and time."""
+"""Forces and moments on a body that is moved through grains, with errors, and the
+accuracy study of these: error against the number of elements or triangles, and time."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from geomech.run.cost import BASE, Cost
 from geomech.scenes.intruding import Intruding
 from geomech.studies.settings import Choice, Measured, cheapest
 
-UNITS = {
+UNITS = {  # by the first part of names
     "t": "s",
     "angle": "rad",
     "x": "m",
@@ -23,18 +23,23 @@ UNITS = {
     "z": "m",
     "force": "N",
     "moment": "N m",
-}  # by the first part of names
+}
 LABELS = {
     "force": "on the body, with the weight of effects that have one",
     "moment": "on the body, about the frame's origin",
 }
 TOLERANCES = 10.0 ** -np.arange(1, 7)  # over the largest force and moment
-MARGIN = 1.125  # factor on the extrapolation by order: covers the error of 95 of 100 motions of outlines, measured
+# Factor on the extrapolation by order: covers the error of 95 of 100 motions of
+# outlines, measured.
+MARGIN = 1.125
+# Elements that take as long as a balance.
+ELEMENTS_PER_BALANCE = 150
 
 
 def cost(scene: Intruding) -> Elements:
     """Return the cost of `answer`."""
-    return price(scene, sum((1, *scene.finer)) * scene.count)
+    runs = sum((1, *scene.finer))  # in runs with the scene's own parts
+    return total_cost(scene, runs * scene.count)
 
 
 def answer(scene: Intruding) -> Result:
@@ -67,10 +72,11 @@ def answer(scene: Intruding) -> Result:
     lines = effect_lines(scene.effects)
     if lines:
         variables.append(Variable("effect", ("line",), lines))
-    kinds = type(scene.intruder).__name__, type(scene.motion).__name__
+    intruder = type(scene.intruder).__name__
+    motion = type(scene.motion).__name__
     size = f"{scene.count:,} {scene.parts}"
     facts = {
-        "about": f"{kinds[0]} of {size}, {kinds[1]} in {len(run.t)} steps",
+        "about": f"{intruder} of {size}, {motion} in {len(run.t)} steps",
         "parts": scene.parts,
     }
     matched = getattr(scene, "matched", "")
@@ -80,46 +86,52 @@ def answer(scene: Intruding) -> Result:
 
 
 class Estimate(NamedTuple):
-    """Largest errors of force, N, and moment, N m, along the motion, from finer parts, at most ``count``; nan where a
-    body does not allow so many."""
+    """Largest errors of force, N, and moment, N m, along the motion, from finer parts,
+    at most ``count``; nan where a body does not allow so many."""
 
     force: float
     moment: float
     count: int
 
 
-def estimate(scene: Intruding, run) -> Estimate:
-    """Return the largest change of a run with finer parts, extrapolated by the order of the error."""
-    change, counts = np.zeros(2), [times * scene.count for times in scene.finer]
-    try:
-        counts = [scene.actual_count(count) for count in counts]
-    except ValueError:
-        counts = [scene.count]
+def estimate(scene: Intruding, run: Any) -> Estimate:
+    """Return the largest change of a run with finer parts, extrapolated by the order of
+    the error."""
+    counts = _finer_counts(scene)
     if counts[0] == scene.count:
         return Estimate(np.nan, np.nan, scene.count)
+    force = np.float64(0.0)
+    moment = np.float64(0.0)
     for times, count in zip(scene.finer, counts):
-        finer, factor = (
-            scene.run(times * scene.count),
-            MARGIN / (1.0 - (scene.count / count) ** scene.order),
-        )
-        pairs = (
-            (x.reshape(len(x), -1), y.reshape(len(y), -1))
-            for x, y in zip(_loads(finer), _loads(run))
-        )
-        change = np.maximum(
-            change, [factor * np.linalg.norm(x - y, axis=1).max() for x, y in pairs]
-        )
-    return Estimate(*change.tolist(), counts[-1])
+        finer = scene.run(times * scene.count)
+        factor = MARGIN / (1.0 - (scene.count / count) ** scene.order)
+        force_change = factor * _largest_change(finer.force, run.force)
+        moment_change = factor * _largest_change(finer.moment, run.moment)
+        force = np.maximum(force, force_change)
+        moment = np.maximum(moment, moment_change)
+    return Estimate(float(force), float(moment), counts[-1])
 
 
-def _loads(run) -> tuple[np.ndarray, np.ndarray]:
-    return run.force, run.moment
+def _finer_counts(scene: Intruding) -> list[int]:
+    """Return the numbers of parts of the finer runs; the scene's own where its body
+    does not allow so many."""
+    try:
+        return [scene.actual_count(times * scene.count) for times in scene.finer]
+    except ValueError:
+        return [scene.count]
+
+
+def _largest_change(finer: np.ndarray, coarse: np.ndarray) -> float:
+    """Return the largest norm of the difference of vectors (T, ...) along a motion."""
+    difference = (finer - coarse).reshape(len(coarse), -1)
+    return np.linalg.norm(difference, axis=1).max()
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Force and moment along a motion by numbers of parts. Errors are rms over the motion, over the largest value,
-    against the finest of the scene's ladder."""
+    """Force and moment along a motion by numbers of parts, as the subject of accuracy
+    studies (`geomech.studies.accuracy`). Errors are rms over the motion, over the
+    largest value, against the finest of the scene's ladder."""
 
     scene: Intruding
     runs: int = 3
@@ -135,36 +147,42 @@ class Settings:
 
     def cost(self) -> Elements:
         *counts, finest = self.scene.ladder
-        return price(self.scene, finest + self.runs * sum(counts))
+        return total_cost(self.scene, finest + self.runs * sum(counts))
 
     def prepared(self) -> Settings:
         return self
 
     def settings(self) -> list[Setting]:
-        """Return the number of parts as a setting; a shape may have more than the number given."""
+        """Return the number of parts as a setting; a shape may have more than the
+        number given."""
         values = tuple(self.scene.actual_count(n) for n in self.scene.ladder[:-1])
         return [Setting(self.scene.parts, values, self.scene.order, against="limit")]
 
     def numbers(self, setting: Setting | None, value: Any) -> list[np.ndarray]:
-        """Return force (T, 2 or 3), N, and moment (T,) or (T, 3), N m, along the motion."""
-        *counts, finest = self.scene.ladder
-        run = self.scene.run(
-            finest if value is None else counts[self.settings()[0].values.index(value)]
-        )
+        """Return force (T, 2 or 3), N, and moment (T,) or (T, 3), N m, along the
+        motion; with the finest parts for None."""
+        *counts, count = self.scene.ladder
+        if value is not None:
+            (parts,) = self.settings()
+            count = counts[parts.values.index(value)]
+        run = self.scene.run(count)
         return [run.force, run.moment]
 
     def errors(
         self, numbers: list[np.ndarray], truth: list[np.ndarray]
     ) -> dict[str, float]:
-        """Return the error of force and moment; a moment that is only roundoff is compared to the force times the
-        body's size."""
-        errors, most = {}, np.abs(truth[0]).max()
+        """Return the errors of force and moment. A moment that is only roundoff is
+        compared to the force times the body's size."""
+        errors = {}
+        largest_force = np.abs(truth[0]).max()
         for what, arm, one, exact in zip(
             self.measures, (1.0, self.scene.size), numbers, truth
         ):
-            largest, bound = np.abs(exact).max(), arm * most
-            largest = largest if largest > ROUNDING * bound else bound or 1.0
-            errors[what] = float(np.sqrt(np.mean((one - exact) ** 2)) / largest)
+            scale = np.abs(exact).max()
+            bound = arm * largest_force
+            if not scale > ROUNDING * bound:
+                scale = bound or 1.0
+            errors[what] = float(np.sqrt(np.mean((one - exact) ** 2)) / scale)
         return errors
 
     def choices(self, measured: Measured) -> list[Variable]:
@@ -173,9 +191,9 @@ class Settings:
         errors = np.maximum(*measured.errors.values())
 
         def choose(tolerance: float) -> Choice | None:
-            good = np.flatnonzero(errors[0] <= tolerance)
-            if good.size:
-                return Choice(0, int(good[0]))
+            within = np.flatnonzero(errors[0] <= tolerance)
+            if within.size:
+                return Choice(0, int(within[0]))
             return None
 
         return cheapest(measured, errors, self.unit, TOLERANCES, choose)
@@ -197,11 +215,16 @@ class Elements(Cost):
 
     @property
     def as_balances(self) -> float:
-        """Number of balances that take NumPy as long: 150 elements count as one; triangles are never compiled."""
-        return self.balances / 150 if self.parts == "elements" else 0.0
+        """Number of balances that take NumPy as long; none for triangles, which are
+        never compiled."""
+        if self.parts == "elements":
+            return self.balances / ELEMENTS_PER_BALANCE
+        return 0.0
 
     def __str__(self) -> str:
-        return f"{self.balances:,} {self.parts} at a pose, about {max(1.0, self.seconds):.0f} s of computing"
+        seconds = max(1.0, self.seconds)
+        parts = f"{self.balances:,} {self.parts}"
+        return f"{parts} at a pose, about {seconds:.0f} s of computing"
 
 
 class Triangles(Elements):
@@ -210,9 +233,9 @@ class Triangles(Elements):
     parts = "triangles"
 
 
-def price(scene: Intruding, count: int | None = None) -> Elements:
-    """Return the cost of runs with so many parts in all, or of one with the scene's own."""
-    parts = scene.motion.samples * (count or scene.count)
-    kind = next(kind for kind in (Elements, Triangles) if kind.parts == scene.parts)
+def total_cost(scene: Intruding, count: int) -> Elements:
+    """Return the cost of runs along a scene's motion with ``count`` parts in all."""
+    parts = scene.motion.samples * count
     seconds = parts * scene.per_part
+    kind = Triangles if scene.parts == Triangles.parts else Elements
     return kind(parts, seconds, BASE, seconds)

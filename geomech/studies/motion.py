@@ -1,4 +1,5 @@
-"""Motion of a scene: the pose of its body at every phase of its gait, cycle after cycle."""
+"""Motion of a scene: the pose of its body at every phase of its gait, cycle after
+cycle."""
 
 from __future__ import annotations
 
@@ -32,8 +33,8 @@ from rft.core.refusal import Refusal, located
 
 MOST_CYCLES = 10_000
 # s to compute and write a number of a table; some two times the measured time.
-WORDS = 2e-6
-HELD = 4  # copies of a table, of its numbers or its poses, in memory at a time
+SECONDS_PER_NUMBER = 2e-6
+COPIES = 4  # of a table, of its numbers or its poses, in memory at a time
 OVER = ("phase",)
 GRID = ("component", "shape_1", "shape_2")  # dimensions of the CCF beside a motion
 FINAL = tuple(f"final_{name}" for name in POSE)
@@ -41,10 +42,11 @@ FINAL = tuple(f"final_{name}" for name in POSE)
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Poses and shapes, phase after phase, with the end of the last cycle as the last row.
+    """Poses and shapes, phase after phase, with the end of the last cycle as the last
+    row.
 
-    phase: (P,), rad, growing from cycle to cycle. alpha: (P, joints). pose: (P, 3), of the
-    body frame in the frame at phase 0, on the ground, in the scene's unit and rad.
+    phase: (P,), rad, growing from cycle to cycle. alpha: (P, joints). pose: (P, 3), of
+    the body frame in the frame at phase 0, on the ground, in the scene's unit and rad.
     frequency: of the gait, Hz, or None."""
 
     scene: Scene
@@ -65,7 +67,7 @@ class Motion:
         return self.phase / (2 * np.pi * self.frequency)
 
     def points(self, rows: Any = slice(None)) -> np.ndarray | None:
-        """Return ends of the links in the world, (..., links + 1, 2), tail to head, at
+        """Return ends of the links in the world (..., links + 1, 2), tail to head, at
         some of the rows; None for a system without a body to draw."""
         body = capability(self.scene.system, Drawable)
         if body is None:
@@ -81,72 +83,78 @@ def is_mapped(scene: Scene) -> bool:
 def answer(
     tables: SceneTables, cycles: int, mapped: bool, progress: Any = None
 ) -> Result:
-    """Return so many cycles of a scene's motion as a result.
+    """Return the motion of a scene over cycles of its gait, as a result.
 
-    mapped: with the CCF, on which a picture shows the shapes, of a scene that has one."""
+    mapped: with the CCF, on which a picture shows the shapes, for a scene that has
+    one."""
     scene = tables.scene
-    moved = motion(scene, cycles)
-    found, facts = variables(moved), attributes(moved)
+    motion = compute_motion(scene, cycles)
+    found = variables(motion)
+    facts = attributes(motion)
     if mapped and is_mapped(scene):
         tables.compute_field(progress)
-        found += of_map(tables)
+        found += ccf_variables(tables)
         facts["interpolation"] = tables.curvature.degree
     return Result("trajectory", tuple(found), facts)
 
 
-def attributes(moved: Motion) -> dict[str, Any]:
+def attributes(motion: Motion) -> dict[str, Any]:
     """Return facts about a motion."""
-    scene = moved.scene
+    scene = motion.scene
     facts: dict[str, Any] = {
         "frame": scene.frame,
-        "cycles": moved.cycles,
+        "cycles": motion.cycles,
         "body_length": float(body_size(scene.system)),
     }
-    if moved.frequency is not None:
-        facts["frequency"] = float(moved.frequency)
+    if motion.frequency is not None:
+        facts["frequency"] = float(motion.frequency)
     return facts
 
 
-def variables(moved: Motion) -> list[Variable]:
+def variables(motion: Motion) -> list[Variable]:
     """Return the final pose, and time, pose, shape and ends of all links at every
     phase."""
-    system = moved.scene.system
+    scene = motion.scene
+    system = scene.system
     unit = length_unit(system)
-    phase = Variable("phase", OVER, moved.phase, "rad", "of the gait, 2 pi a cycle")
-    found = [*final_pose(moved), phase]
-    if moved.time is not None:
-        found.append(Variable("time", OVER, moved.time, "s", "from phase 0"))
-    label = f"of the frame {moved.scene.frame}, seen from where it is at phase 0"
-    for name, values, of in zip(POSE, moved.pose.T, (unit, unit, "rad")):
-        found.append(Variable(name, OVER, values, of, label))
-    shapes = zip(moved.alpha.T, shape_labels(system), fields.angles_of(moved.alpha.T))
-    for k, (values, (label, of), name) in enumerate(shapes):
+    phase = Variable("phase", OVER, motion.phase, "rad", "of the gait, 2 pi a cycle")
+    found = [*final_pose(motion), phase]
+    if motion.time is not None:
+        found.append(Variable("time", OVER, motion.time, "s", "from phase 0"))
+
+    label = f"of the frame {scene.frame}, seen from where it is at phase 0"
+    for name, values, pose_unit in zip(POSE, motion.pose.T, (unit, unit, "rad")):
+        found.append(Variable(name, OVER, values, pose_unit, label))
+
+    names = fields.angle_names(motion.alpha.T)
+    shapes = zip(names, motion.alpha.T, shape_labels(system))
+    for k, (name, values, (label, shape_unit)) in enumerate(shapes):
         if label == name:
-            label = (
-                f"angle of joint {k + 1}, heading of link {k + 2} minus link {k + 1}"
-            )
-        found.append(Variable(name, OVER, values, of, label))
-    return found + ends(moved.points(), unit)
+            label = fields.joint_label(k)
+        found.append(Variable(name, OVER, values, shape_unit, label))
+    return found + end_variables(motion.points(), unit)
 
 
-def final_pose(moved: Motion) -> list[Variable]:
-    """Return the pose after the last cycle, with why it is zero where a symmetry makes it
-    so."""
-    system = moved.scene.system
-    why = zero_components(system.traits, moved.scene.gait)
-    if "heading" not in why and moved.cycles > 1:
-        why = {}  # where the body turns, x and y of one cycle are not those of all
-    unit, found = length_unit(system), []
-    for name, value, of in zip(POSE, moved.pose[-1], (unit, unit, "rad")):
+def final_pose(motion: Motion) -> list[Variable]:
+    """Return the pose after the last cycle, with the reason where a symmetry makes a
+    component zero."""
+    system = motion.scene.system
+    reasons = zero_components(system.traits, motion.scene.gait)
+    if "heading" not in reasons and motion.cycles > 1:
+        # Where the body turns, x and y of one cycle are not those of all.
+        reasons = {}
+    unit = length_unit(system)
+    found = []
+    for name, value, pose_unit in zip(POSE, motion.pose[-1], (unit, unit, "rad")):
         zero = ""
-        if name in why:
-            zero = zero_words(why[name])
+        if name in reasons:
+            zero = zero_words(reasons[name])
         label = "after the last cycle"
-        found.append(Variable(f"final_{name}", (), value, of, label, zero=zero))
+        found.append(Variable(f"final_{name}", (), value, pose_unit, label, zero=zero))
     return found
 
 
-def ends(points: np.ndarray | None, unit: str) -> list[Variable]:
+def end_variables(points: np.ndarray | None, unit: str) -> list[Variable]:
     """Return the ends of links (P, links + 1, 2), a variable for each coordinate; none
     without a body to draw."""
     if points is None:
@@ -159,36 +167,39 @@ def ends(points: np.ndarray | None, unit: str) -> list[Variable]:
     return found
 
 
-def of_map(tables: SceneTables) -> list[Variable]:
-    """Return the CCF with its error over axes of its own names, as the shapes of a motion
-    are over phase."""
-    ccf = fields.of_ccf(tables.curvature, tables.curvature_error)
+def ccf_variables(tables: SceneTables) -> list[Variable]:
+    """Return the CCF with its error. Its axes have names of their own, as the shapes of
+    a motion depend on the phase."""
+    ccf = fields.ccf_variable(tables.curvature, tables.curvature_error)
     labels = shape_labels(tables.scene.system)
     found = [Variable("component", ("component",), [*COMPONENTS])]
-    for name, axis, (label, of) in zip(GRID[1:], tables.curvature.axes, labels):
-        found.append(Variable(name, (name,), axis, of, f"{label} on the map"))
+    for name, axis, (label, unit) in zip(GRID[1:], tables.curvature.axes, labels):
+        found.append(Variable(name, (name,), axis, unit, f"{label} on the map"))
     return [*found, replace(ccf, dims=GRID)]
 
 
-def motion(scene: Scene, cycles: int = 1) -> Motion:
-    """Return so many cycles of the scene's gait at its own phases, by the direct tier.
+def compute_motion(scene: Scene, cycles: int = 1) -> Motion:
+    """Return the motion over cycles of the scene's gait at its own phases, by the
+    direct tier.
 
-    Where cycles are run until they repeat, the limit cycle is returned; where the place of
-    the body matters, each cycle continues the one before."""
+    Where cycles are run until they repeat, the limit cycle is returned; where the place
+    of the body matters, each cycle continues the one before."""
     if not isinstance(scene, Scene):
         raise Refusal("a motion is that of a Scene", value=scene)
-    checked(cycles)
-    gait, phases = scene.gait, scene.numerics.phases
+    refuse_cycles(cycles)
+    gait = scene.gait
+    phases = scene.numerics.phases
     with located(scene.name):
         alpha, alphadot = gait.cycle(phases)
         stepped = capability(scene.system, Stepped)
         if stepped is None:
-            pose = repeated(poses(scene.system.run(alpha, alphadot).xi), int(cycles))
+            xi = scene.system.run(alpha, alphadot).xi
+            pose = repeated(poses(xi), int(cycles))
         else:
             pose = stepped.path(alpha, alphadot, int(cycles))
-    phase = 2 * np.pi * np.arange(len(pose)) / phases
-    again = alpha[np.arange(len(pose)) % phases]
-    return Motion(scene, phase, again, pose, frequency_of(scene))
+    rows = np.arange(len(pose))
+    phase = 2 * np.pi * rows / phases
+    return Motion(scene, phase, alpha[rows % phases], pose, frequency_of(scene))
 
 
 def frequency_of(scene: Scene) -> float | None:
@@ -196,7 +207,7 @@ def frequency_of(scene: Scene) -> float | None:
     return getattr(scene.gait, "frequency", None)
 
 
-def checked(cycles: int) -> None:
+def refuse_cycles(cycles: int) -> None:
     """Refuse a number of cycles that makes no sense."""
     if not (is_whole(cycles) and 1 <= cycles <= MOST_CYCLES):
         raise Refusal(
@@ -214,31 +225,39 @@ def cost(scene: Scene, cycles: int = 1, mapped: bool = False) -> Cost:
 
 def summed(parts: Sequence[Cost]) -> Cost:
     """Return the cost of parts, one after the other."""
-    balances, seconds, memory, besides, steps = zip(*parts)
-    return Cost(sum(balances), sum(seconds), max(memory), sum(besides), sum(steps))
+    return Cost(
+        balances=sum(part.balances for part in parts),
+        seconds=sum(part.seconds for part in parts),
+        memory=max(part.memory for part in parts),
+        besides=sum(part.besides for part in parts),
+        steps=sum(part.steps for part in parts),
+    )
 
 
 def cost_of_table(scene: Scene, cycles: int) -> Cost:
-    """Return the cost of `motion` and a table of it."""
-    checked(cycles)
-    system, phases = scene.system, scene.numerics.phases
+    """Return the cost of `compute_motion` and a table of it."""
+    refuse_cycles(cycles)
+    system = scene.system
+    phases = scene.numerics.phases
     jobs = direct(scene, scene.gait, 1, phases, checked=False)
     if system.traits.steps and not settling(system):
         # Each continues the one before; cycles up to the limit cycle are run first.
-        first_cycles = cycles_of(system)
+        assumed = cycles_of(system)
+        first_cycles = assumed
         if system.traits.lacks & Premise.SE2_SYMMETRIC:
             first_cycles = 0
-        times = (first_cycles + cycles_of(system) - 1 + cycles) / cycles_of(system)
+        times = (first_cycles + assumed - 1 + cycles) / assumed
         jobs = [
             job._replace(count=job.count * times, batches=job.batches * times)
             for job in jobs
         ]
-    total, rows = price(jobs), cycles * phases + 1
+    total = price(jobs)
+    rows = cycles * phases + 1
     width = 2 * (balance_size(system).elements + 1) + system.joints + 5
-    memory = 8 * HELD * rows * (system.joints + 5 + width)
-    words = WORDS * rows * width
+    memory = 8 * COPIES * rows * (system.joints + 5 + width)
+    seconds = SECONDS_PER_NUMBER * rows * width
     return total._replace(
-        seconds=total.seconds + words,
+        seconds=total.seconds + seconds,
         memory=total.memory + memory,
-        besides=total.besides + words,
+        besides=total.besides + seconds,
     )

@@ -57,7 +57,7 @@ def answer(tables: SceneTables, progress: Callable | None = None) -> Result:
     if len(gaits) > 1:
         facts["other_gaits"] = " ".join(title(gait) for gait in gaits[1:])
     if mapped:
-        shapes = fields.of_study(tables)
+        shapes = fields.full_result(tables)
         found += shapes.variables
         facts = {**shapes.attributes, **facts}
     if mapped and scene.system.joints == 3:

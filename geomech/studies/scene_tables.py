@@ -1,5 +1,5 @@
-"""The tables of a scene: displacements by every tier, and what is computed for them, each
-table once."""
+"""The tables of a scene: displacements by every tier, and what is computed for them,
+each table once."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import copy
 import sys
 import time
 from collections.abc import Callable, Sequence
-from typing import Any, Self, cast
+from functools import partial
+from typing import Any, NamedTuple, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,7 +25,7 @@ from geomech.geometry.harmonics import Harmonics
 from geomech.geometry.metric import Finsler, Metric
 from geomech.geometry.plane import Plane
 from geomech.geometry.two_form import TwoForm, two_form
-from geomech.run.progress import progress as shown
+from geomech.run.progress import progress as shown_progress
 from geomech.scenes.frames import framed
 from geomech.scenes.model import Scene, frequency_of
 from geomech.studies import cost, effort, estimate, tables, uncertainty
@@ -38,98 +39,121 @@ from geomech.tiers.base import Plan, Table, Tier, in_groups
 from rft.core.checks import real_array
 from rft.core.refusal import Refusal, located
 
-FEW_PHASES = 4096  # that tell whether a gait is far from leaving the field
-SAMPLES = 64, FEW_PHASES  # amplitudes and phases that `cost` checks, of all
+# Phases that show whether a gait is far from leaving the field, and those that `cost`
+# checks.
+CHECKED_PHASES = 4096
+CHECKED_AMPLITUDES = 64  # those that `cost` checks
+
+
+class StoredTable(NamedTuple):
+    """A table, the seconds that it took, and whether it was computed before."""
+
+    table: Any
+    seconds: float
+    computed_before: bool
 
 
 class SceneTables:
-    """A scene and the tables computed for it so far, each stored under its name, the system
-    and all other data that it depends on. `with_numerics` returns those of the scene with
-    other numerics, which shares them. `geomech.Study` asks them."""
+    """A scene and the tables computed for it so far, each stored under its name, the
+    system and all other data that it depends on. `with_numerics` returns the tables of
+    the scene with other numerics, in the same store. `geomech.Study` reads them."""
 
     def __init__(self, scene: Scene, tables: dict | None = None):
         if not isinstance(scene, Scene):
             raise Refusal("a study is that of a Scene", value=scene)
-        self.scene, self._tables = scene, {} if tables is None else tables
+        self.scene = scene
+        self._tables = {} if tables is None else tables
 
     def __repr__(self) -> str:
         names = sorted({str(key[0]) for key in self.computed})
-        return f"Study({self.scene!r}; tiers {', '.join(self.tiers)}; computed: {', '.join(names) or 'nothing yet'})"
+        computed = ", ".join(names) or "nothing yet"
+        tiers = ", ".join(self.tiers)
+        return f"Study({self.scene!r}; tiers {tiers}; computed: {computed})"
 
     @property
     def computed(self) -> tuple:
         """Keys (name, system, key) of the tables computed so far."""
         return tuple(self._tables)
 
+    @property
+    def tiers(self) -> tuple[str, ...]:
+        """Names of the tiers that predict the scene's system."""
+        return tiers(self.scene.system)
+
     def with_numerics(self, **numerics: Any) -> Self:
-        """Return the study with other [numerics] and the same stored tables; an entry given as None stays as it is."""
-        return self._of(self.scene.with_numerics(**numerics))
+        """Return the study with other [numerics] and the same stored tables; an entry
+        given as None stays as it is."""
+        return self._with_scene(self.scene.with_numerics(**numerics))
 
     def in_frame(self, frame: str) -> Self:
-        """Return the study in another body frame; Refusal for an unknown one, or the scene's own."""
-        s = self.scene
-        with located(s.name):
-            if frame == s.frame:
+        """Return the study in another body frame; Refusal for an unknown one, or the
+        scene's own."""
+        scene = self.scene
+        with located(scene.name):
+            if frame == scene.frame:
                 raise Refusal(f"the frame is {frame!r} already", instead="name another")
             if frame == MINIMUM_PERTURBATION:
-                system = framed(s.system, s.numerics)
+                system = framed(scene.system, scene.numerics)
             else:
                 try:
-                    system = in_frame(s.system, frame)
+                    system = in_frame(scene.system, frame)
                 except Refusal as refusal:
                     refusal.instead = f"or take {MINIMUM_PERTURBATION!r}"
                     raise
-            return self._of(s.changed(system=system))
+            return self._with_scene(scene.changed(system=system))
 
-    def _of(self, scene: Scene) -> Self:
+    def _with_scene(self, scene: Scene) -> Self:
         """Return the study of another scene with the same stored tables."""
         study = copy.copy(self)
         study.scene = scene
         return study
 
-    tiers = property(lambda self: tiers(self.scene.system))
+    # Tables: computed at their first use.
 
-    def _stored(self, name: str, key: tuple, build: Callable):
-        """Return the value of build(), the seconds that it took, and whether it was stored before."""
-        key = name, self.scene.system, key
-        if not (exists := key in self._tables):
-            import scipy.interpolate  # noqa: F401  loaded here, so that no look-up is charged for it
+    def _stored(self, name: str, key: tuple, build: Callable) -> StoredTable:
+        """Return the table of a name and key, by build() where it is not stored yet."""
+        full_key = (name, self.scene.system, key)
+        computed_before = full_key in self._tables
+        if not computed_before:
+            # Loaded before the clock starts, so that no table is charged for it.
+            import scipy.interpolate  # noqa: F401
 
-            self._tables[key] = timed(build)
-        return *self._tables[key], exists
+            self._tables[full_key] = timed_call(build)
+        table, seconds = self._tables[full_key]
+        return StoredTable(table, seconds, computed_before)
 
-    def _built(self, table: Table, progress: Callable | None = None):
-        """Return what `_stored` returns, for a table. Without ``progress`` a line shows it where it takes long."""
+    def _build(self, table: Table, progress: Callable | None = None) -> StoredTable:
+        """Return the data of a table of a tier. Without ``progress`` a line shows the
+        progress of a table that takes long."""
 
         def build():
             if progress:
                 return table.build(progress)
-            with shown(
-                f"{table.name} of {self.scene.name}, {table.balances:,} force balances",
-                bar=False,
-            ) as bar:
-                return table.build(bar)
+            balances = f"{table.balances:,} force balances"
+            title = f"{table.name} of {self.scene.name}, {balances}"
+            with shown_progress(title, bar=False) as report:
+                return table.build(report)
 
         return self._stored(table.name, table.key, build)
-
-    def _connection(self) -> Table:
-        return fitted.table(self.scene.system, self.scene.numerics)
 
     def plan(
         self, tier: str, gait: Gait | None = None, amplitudes: ArrayLike | None = None
     ) -> Plan:
-        """Return how a tier predicts displacements of a gait, or of the scene's own; Refusal if it is not available."""
+        """Return how a tier predicts displacements of a gait, or of the scene's own;
+        Refusal if it is not available."""
         with located(self.scene.name):
             chosen = _tier(tier)
             chosen.refuse(self.scene.system)
-            return self._plan(
-                chosen,
-                self.scene.gait if gait is None else checked_gait(gait),
-                amplitudes,
-            )
+            return self._plan(chosen, self._gait(gait), amplitudes)
 
     def _plan(self, tier: Tier, gait: Gait, amplitudes) -> Plan:
         return tier.plan(self.scene.system, self.scene.numerics, gait, amplitudes)
+
+    def _gait(self, gait: Gait | None) -> Gait:
+        """Return the gait given, checked, or the scene's own."""
+        if gait is None:
+            return self.scene.gait
+        return checked_gait(gait)
 
     def table(
         self,
@@ -138,13 +162,18 @@ class SceneTables:
         amplitudes: ArrayLike | None = None,
         progress: Callable | None = None,
     ) -> Any:
-        """Return the table of a tier, computed once: a Connection, Harmonics or a Family; None for a tier without one.
-        Refusal if the tier is not available."""
-        return self._table_of(self.plan(tier, gait, amplitudes), progress)
+        """Return the table of a tier, computed once: a Connection, Harmonics or a
+        Family; None for a tier without one. Refusal if the tier is not available."""
+        return self._table_of_plan(self.plan(tier, gait, amplitudes), progress)
 
-    def _table_of(self, plan: Plan, progress: Callable | None = None) -> Any:
+    def _table_of_plan(self, plan: Plan, progress: Callable | None = None) -> Any:
+        if not plan.table:
+            return None
         with located(self.scene.name):
-            return self._built(plan.table, progress)[0] if plan.table else None
+            return self._build(plan.table, progress).table
+
+    def _connection_table(self) -> Table:
+        return fitted.table(self.scene.system, self.scene.numerics)
 
     @property
     def fitted(self) -> Connection:
@@ -155,145 +184,157 @@ class SceneTables:
         """Return `fitted`. progress: called with the fraction done."""
         with located(self.scene.name):
             fitted.refuse(self.scene.system)
-            return self._built(self._connection(), progress)[0]
-
-    def compute_harmonics(self, progress: Callable | None = None) -> Harmonics:
-        """Return the odd harmonics of the velocity on the scene's grid. progress: called with the fraction done."""
-        with located(self.scene.name):
-            return self._built(
-                harmonic.table(self.scene.system, self.scene.numerics), progress
-            )[0]
+            return self._build(self._connection_table(), progress).table
 
     @property
     def harmonics(self) -> Harmonics | None:
-        """Harmonics of the velocity in a plain study; None where it is linear, or has too many joints."""
-        return (
-            self.compute_harmonics()
-            if harmonic.is_looked_up(self.scene.system)
-            else None
-        )
+        """Harmonics of the velocity in a plain study; None where it is linear, or has
+        too many joints."""
+        if not harmonic.is_looked_up(self.scene.system):
+            return None
+        return self.compute_harmonics()
+
+    def compute_harmonics(self, progress: Callable | None = None) -> Harmonics:
+        """Return the odd harmonics of the velocity on the scene's grid. progress:
+        called with the fraction done."""
+        with located(self.scene.name):
+            table = harmonic.table(self.scene.system, self.scene.numerics)
+            return self._build(table, progress).table
 
     def plane(
         self,
         pair: Sequence[int],
-        at: ArrayLike | None = None,
+        shape: ArrayLike | None = None,
         progress: Callable | None = None,
     ) -> Plane:
-        """Return a plane of shape space in which two joints move, counted from 0, through a shape or the gait's middle:
-        the CCF of that pair, without a field of all joints (`geomech.geometry.plane`)."""
-        s, both = self.scene, cast(tuple[int, int], tuple(pair))
-        place: Any = s.gait.middle if at is None else at
-        with located(s.name):
-            build = lambda: fitted.plane(s.system, s.numerics, both, place, progress)
-            return self._stored(
-                "plane", (*self._connection().key, *both, *place), build
-            )[0]
+        """Return a plane of shape space in which two joints move, counted from 0,
+        through a shape or the gait's middle: the CCF of that pair, without a field of
+        all joints (`geomech.geometry.plane`)."""
+        scene = self.scene
+        joints = cast(tuple[int, int], tuple(pair))
+        through: Any = scene.gait.middle if shape is None else shape
+        with located(scene.name):
 
-    @property
-    def two_form(self) -> TwoForm:
-        """CCF of all pairs of joints, of any number (`geomech.geometry.two_form`)."""
-        return self._stored(
-            "two-form", self._connection().key, lambda: two_form(self.fitted)
-        )[0]
+            def build():
+                return fitted.plane(
+                    scene.system, scene.numerics, joints, through, progress
+                )
 
-    def compute_metric(self, progress: Callable | None = None) -> Metric | Finsler:
-        """Return `metric`. progress: called with the fraction done. Where it needs the velocities of the harmonic
-        table, that table is stored, too."""
-        s = self.scene
-        with located(s.name):
-            key = fitted.key(s.numerics, effort.DEPENDS_ON)
-            return self._stored("metric", key, lambda: self._new_metric(progress))[0]
-
-    def _new_metric(self, progress: Callable | None) -> Metric | Finsler:
-        system, n = self.scene.system, self.scene.numerics
-        shared = harmonic.table(system, n)
-        if (
-            not effort.shared(system)
-            or (shared.name, system, shared.key) in self._tables
-        ):
-            return effort.table(system, n, progress)
-        (harmonics, norm), took = timed(
-            lambda: effort.with_harmonics(system, n, progress)
-        )
-        self._tables[shared.name, system, shared.key] = harmonics, took
-        return norm
-
-    @property
-    def metric(self) -> Metric | Finsler:
-        """Cost of changes of shape on the field's grid (`geomech.geometry.metric`): a quadratic form where xi = A
-        alphadot, else a norm. Refusal if the system has none."""
-        return self.compute_metric()
-
-    def effort(
-        self, gait: Gait | None = None, amplitudes: ArrayLike | None = None
-    ) -> dict[str, np.ndarray]:
-        """Return path length and work of a gait, or the scene's own, with their errors: see
-        `geomech.studies.effort.effort`."""
-        with located(self.scene.name):
-            self.scene.note_turns(
-                self.scene.gait if gait is None else checked_gait(gait), amplitudes
-            )
-            return effort.effort(self.scene, gait, amplitudes)
-
-    @property
-    def even_part(self) -> np.ndarray | None:
-        """Part of the velocity that is even in alphadot, as with skin friction (`connection.even_part`); None if there
-        is none."""
-        system = self.scene.system
-        if stored_table(system, "connection"):
-            return stored_table(system, "even part")
-        build = lambda: even_part(system.velocity, self.fitted.axes, system.traits)
-        return self._stored(
-            "even part", fitted.key(self.scene.numerics, ("grid", "extent")), build
-        )[0]
+            key = (*self._connection_table().key, *joints, *through)
+            return self._stored("plane", key, build).table
 
     @property
     def curvature(self) -> Field:
         """CCF of `fitted`, for joints 1 and 2."""
-        return self._stored("ccf", self._connection().key, lambda: ccf(self.fitted))[0]
+        key = self._connection_table().key
+        return self._stored("ccf", key, lambda: ccf(self.fitted)).table
 
     @property
     def curvature_error(self) -> Field:
         """Estimated error of `curvature`."""
-        return self._stored(
-            "error of the ccf", self._connection().key, lambda: ccf_error(self.fitted)
-        )[0]
+        key = self._connection_table().key
+        name = "error of the ccf"
+        return self._stored(name, key, lambda: ccf_error(self.fitted)).table
+
+    @property
+    def two_form(self) -> TwoForm:
+        """CCF of all pairs of joints, of any number (`geomech.geometry.two_form`)."""
+        key = self._connection_table().key
+        return self._stored("two-form", key, lambda: two_form(self.fitted)).table
+
+    @property
+    def even_part(self) -> np.ndarray | None:
+        """Part of the velocity that is even in alphadot, as with skin friction
+        (`connection.even_part`); None if there is none."""
+        system = self.scene.system
+        if stored_table(system, "connection"):
+            return stored_table(system, "even part")
+
+        def build():
+            return even_part(system.velocity, self.fitted.axes, system.traits)
+
+        key = fitted.key(self.scene.numerics, ("grid", "extent"))
+        return self._stored("even part", key, build).table
+
+    @property
+    def metric(self) -> Metric | Finsler:
+        """Cost of changes of shape on the field's grid (`geomech.geometry.metric`): a
+        quadratic form where xi = A alphadot, else a norm. Refusal if the system has
+        none."""
+        return self.compute_metric()
+
+    def compute_metric(self, progress: Callable | None = None) -> Metric | Finsler:
+        """Return `metric`. progress: called with the fraction done. Where it needs the
+        velocities of the harmonic table, that table is stored as well."""
+        scene = self.scene
+        with located(scene.name):
+            key = fitted.key(scene.numerics, effort.DEPENDS_ON)
+            build = partial(self._new_metric, progress)
+            return self._stored("metric", key, build).table
+
+    def _new_metric(self, progress: Callable | None) -> Metric | Finsler:
+        """Return `metric`, computed anew."""
+        system = self.scene.system
+        numerics = self.scene.numerics
+        table = harmonic.table(system, numerics)
+        key = (table.name, system, table.key)
+        if not effort.shared(system) or key in self._tables:
+            return effort.table(system, numerics, progress)
+        # The velocities of the metric are those of the harmonics.
+        both, seconds = timed_call(effort.with_harmonics, system, numerics, progress)
+        harmonics, norm = both
+        self._tables[key] = (harmonics, seconds)
+        return norm
+
+    # Displacements and their cost.
+
+    def effort(
+        self, gait: Gait | None = None, amplitudes: ArrayLike | None = None
+    ) -> dict[str, np.ndarray]:
+        """Return path length and work of a gait, or the scene's own, with their errors:
+        see `geomech.studies.effort.effort`."""
+        with located(self.scene.name):
+            self.scene.note_turns(self._gait(gait), amplitudes)
+            return effort.effort(self.scene, gait, amplitudes)
 
     def poses(
         self, tier: str, gait: Gait | None = None, amplitudes: ArrayLike | None = None
     ) -> np.ndarray:
-        """Return the net pose per cycle (..., 3) by one tier of TIERS for amplitudes (...,), of a gait or the scene's
-        own."""
-        scene, gait = (
-            self.scene,
-            self.scene.gait if gait is None else checked_gait(gait),
-        )
+        """Return the net pose per cycle (..., 3) by one tier of TIERS for amplitudes
+        (...,), of a gait or the scene's own."""
+        scene = self.scene
+        gait = self._gait(gait)
         with located(scene.name):
             plan = self.plan(tier, gait, amplitudes)
             scene.note_turns(gait, amplitudes)
             self._refuse_singular(plan, gait, amplitudes)
-            return plan.predict(self._table_of(plan), amplitudes)
+            return plan.predict(self._table_of_plan(plan), amplitudes)
 
     def spread(
         self, tier: str, gait: Gait | None = None, amplitudes: ArrayLike | None = None
     ) -> np.ndarray | None:
-        """Return how far `poses` depend on an arbitrary choice of the tier, such as a surface spanned by the
-        loop: (B, 2), in the system's unit and rad; None without one. Estimates include it."""
+        """Return how far `poses` depend on an arbitrary choice of the tier, such as a
+        surface spanned by the loop: (B, 2), in the system's unit and rad; None without
+        one. Estimates include it."""
         plan = self.plan(tier, gait, amplitudes)
-        return plan.spread(self._table_of(plan), amplitudes)
+        return plan.spread(self._table_of_plan(plan), amplitudes)
 
     def _refuse_singular(
         self, plan: Plan, gait: Gait, amplitudes, phases: int | None = None
     ) -> None:
-        """Refuse a gait, or a curve of the family of the table, that meets a singular shape."""
-        system, phases = self.scene.system, phases or self.scene.numerics.phases
-        if system.traits.singularity is not None:
-            a = real_array(
-                "amplitudes", gait.amplitude if amplitudes is None else amplitudes
-            )
-            if plan.table and plan.table.amplitudes is not None:
-                a = plan.table.amplitudes
-            refuse_singular(system, gait.cycle(phases, a)[0])
+        """Refuse a gait, or a curve of the family of the table, that meets a singular
+        shape. phases: the scene's if None."""
+        system = self.scene.system
+        if system.traits.singularity is None:
+            return
+        if phases is None:
+            phases = self.scene.numerics.phases
+        checked = gait.amplitude if amplitudes is None else amplitudes
+        checked = real_array("amplitudes", checked)
+        if plan.table and plan.table.amplitudes is not None:
+            checked = plan.table.amplitudes
+        alpha, _ = gait.cycle(phases, checked)
+        refuse_singular(system, alpha)
 
     def displacements(
         self,
@@ -310,63 +351,86 @@ class SceneTables:
         its errors; "errors" of the others, without the direct tier; "medium" of the
         errors of an uncertain one. computed_before: of tables that were stored, whose
         seconds are not part of this call."""
-        gait, values, chosen = self._checked(gait, amplitudes, tiers)
-        medium, took = timed(
-            lambda: uncertainty.of_medium(self.scene, gait, values)
-        )  # first, as it may refuse
-        seconds, stored = self._build_all(chosen, progress)
+        scene = self.scene
+        gait, values, plans = self._checked_request(gait, amplitudes, tiers)
+        # The medium first, as it may refuse.
+        medium, took = timed_call(uncertainty.of_medium, scene, gait, values)
+        seconds, computed_before = self._build_all(plans, progress)
         if medium:
             seconds["medium"] = took
-        poses, errors, spreads, reference = {}, {}, {}, None
-        size = [body_size(self.scene.system), 1.0]  # estimates are in body lengths
-        order = [*TIERS]
-        for tier in sorted(
-            chosen, key=lambda m: (not chosen[m].exact, -order.index(m))
-        ):  # the direct tier first, as the reference of others
-            if chosen[tier].exact:
-                direct = lambda: estimate.direct(
-                    self.scene, gait, values, self.scene.numerics.phases
-                )
-                reference, seconds[tier] = timed(direct)
-                poses[tier], errors[tier] = reference
-            else:
-                poses[tier], seconds[tier] = timed(
-                    lambda m=tier: self.poses(m, gait, values)
-                )
-                check = lambda m=tier: estimate.against_direct(
-                    self.scene, poses[m], gait, values, reference
-                )
-                errors[tier], took = timed(check)
-                if (spread := self.spread(tier, gait, values)) is not None:
-                    spreads[tier], errors[tier] = (
-                        spread,
-                        np.maximum(errors[tier], spread / size),
-                    )
-                if reference is None:
-                    seconds["errors"] = seconds.get("errors", 0.0) + took
-        poses, errors = ({m: x[m] for m in chosen} for x in (poses, errors))
-        more = tables.timings(seconds, stored)
+        poses, errors, spreads = self._predict(plans, gait, values, seconds)
+        timings = tables.timings(seconds, computed_before)
         return tables.result(
-            self.scene, gait, values, poses, errors, medium, spreads, more
+            scene, gait, values, poses, errors, medium, spreads, timings
         )
 
     def _build_all(
-        self, chosen: dict[str, Plan], progress
+        self, plans: dict[str, Plan], progress: Callable | None
     ) -> tuple[dict[str, float], list[str]]:
-        """Build the tables of tiers; return the seconds that each took, even if before, and the names of those that
-        were stored."""
-        field, seconds, stored = self._connection(), {}, []
-        tables = {m: plan.table for m, plan in chosen.items() if plan.table}
-        of_field = lambda m: tables[m].name == field.name
-        for tier in sorted(
-            tables, key=of_field, reverse=True
-        ):  # the field first, as it is also drawn
-            name = "field" if of_field(tier) else f"{tier} table"
-            if name not in seconds:
-                with located(self.scene.name):
-                    _, seconds[name], exists = self._built(tables[tier], progress)
-                stored += [name] * exists
-        return seconds, stored
+        """Build the tables of plans by tier; return the seconds that each took, even if
+        before, and the names of those that were stored."""
+        field = self._connection_table().name
+
+        # The field first, as it is also drawn.
+        fields = []
+        others = []
+        for tier, plan in plans.items():
+            if plan.table and plan.table.name == field:
+                fields.append(("field", plan.table))
+            elif plan.table:
+                others.append((f"{tier} table", plan.table))
+
+        seconds: dict[str, float] = {}
+        computed_before = []
+        for name, table in [*fields, *others]:
+            if name in seconds:
+                continue
+            with located(self.scene.name):
+                stored = self._build(table, progress)
+            seconds[name] = stored.seconds
+            if stored.computed_before:
+                computed_before.append(name)
+        return seconds, computed_before
+
+    def _predict(
+        self,
+        plans: dict[str, Plan],
+        gait: Gait,
+        amplitudes: np.ndarray,
+        seconds: dict[str, float],
+    ) -> tuple[dict, dict, dict]:
+        """Return net poses, their errors, and spreads, each by tier, and add to the
+        seconds what each tier and the errors took."""
+        scene = self.scene
+        sizes = [body_size(scene.system), 1.0]  # errors are in body lengths
+        poses = {}
+        errors = {}
+        spreads = {}
+        reference = None
+        for tier in _reference_first(plans):
+            if plans[tier].exact:
+                phases = scene.numerics.phases
+                reference, seconds[tier] = timed_call(
+                    estimate.direct, scene, gait, amplitudes, phases
+                )
+                poses[tier], errors[tier] = reference
+                continue
+
+            poses[tier], seconds[tier] = timed_call(self.poses, tier, gait, amplitudes)
+            error, took = timed_call(
+                estimate.against_direct,
+                scene, poses[tier], gait, amplitudes, reference,
+            )  # fmt: skip
+            spread = self.spread(tier, gait, amplitudes)
+            if spread is not None:
+                spreads[tier] = spread
+                error = np.maximum(error, spread / sizes)
+            errors[tier] = error
+            if reference is None:
+                seconds["errors"] = seconds.get("errors", 0.0) + took
+        poses = {tier: poses[tier] for tier in plans}
+        errors = {tier: errors[tier] for tier in plans}
+        return poses, errors, spreads
 
     def cost(
         self,
@@ -375,100 +439,135 @@ class SceneTables:
         gait: Gait | None = None,
         more: Sequence[cost.Job] = (),
     ) -> cost.Cost:
-        """Return the cost of `displacements`, and of ``more`` jobs: force balances, seconds on this machine and memory; see
-        `geomech.studies.cost`."""
-        gait, amplitudes, plans = self._checked(gait, amplitudes, tiers, *SAMPLES)
-        with located(self.scene.name):
-            return cost.price(
-                [*cost.study(self.scene, plans, len(amplitudes), gait), *more]
-            )
-
-    def _checked(
-        self,
-        gait,
-        amplitudes,
-        tiers,
-        samples: int = sys.maxsize,
-        phases: int = sys.maxsize,
-    ):
-        """Return the gait, or the scene's own, amplitudes (B,) and plans by tier of a request.
-
-        Refusal for one that makes no sense, such as a gait that leaves the field at one of ``samples`` amplitudes, at so
-        many phases."""
-        scene = self.scene
-        gait, amplitudes = (
-            checked_gait(scene.gait if gait is None else gait),
-            real_array("amplitudes", amplitudes),
+        """Return the cost of `displacements`, and of ``more`` jobs: force balances,
+        seconds on this machine and memory; see `geomech.studies.cost`."""
+        gait, values, plans = self._checked_request(
+            gait, amplitudes, tiers, CHECKED_AMPLITUDES, CHECKED_PHASES
         )
+        with located(self.scene.name):
+            jobs = cost.study(self.scene, plans, len(values), gait)
+            return cost.price([*jobs, *more])
+
+    def _checked_request(
+        self,
+        gait: Gait | None,
+        amplitudes: ArrayLike,
+        tiers: Sequence[str] | None,
+        most_amplitudes: int = sys.maxsize,
+        most_phases: int = sys.maxsize,
+    ) -> tuple[Gait, np.ndarray, dict[str, Plan]]:
+        """Return the gait, or the scene's own, amplitudes (B,) and plans by tier of a
+        request.
+
+        Refusal for one that makes no sense, such as a gait that leaves the field. At
+        most so many amplitudes and phases are checked for that."""
+        scene = self.scene
+        gait = checked_gait(scene.gait if gait is None else gait)
+        amplitudes = real_array("amplitudes", amplitudes)
         if amplitudes.ndim != 1:
             raise Refusal(
                 "amplitudes must be a list of numbers",
                 value=amplitudes,
                 where=scene.name,
             )
-        tiers = default_tiers(scene.system) if tiers is None else tiers
+        if tiers is None:
+            tiers = default_tiers(scene.system)
         if isinstance(tiers, str) or not isinstance(tiers, Sequence):
             raise Refusal(
                 f"tiers must be a list of {', '.join(TIERS)}",
                 value=tiers,
                 where=scene.name,
             )
+
         with located(scene.name):
             frequency_of(scene.system, gait)
             scene.note_turns(gait, amplitudes)
-            sampled = np.sort(amplitudes)[
-                np.linspace(
-                    0, len(amplitudes) - 1, min(len(amplitudes), samples)
-                ).astype(int)
-            ]
-            phases, chosen = (
-                min(scene.numerics.phases, max(phases, 4 * gait.harmonics)),
-                {},
-            )
-            for tier in [_tier(m) for m in tiers]:
+            checked = _evenly_sampled(np.sort(amplitudes), most_amplitudes)
+            most_phases = max(most_phases, 4 * gait.harmonics)
+            phases = min(scene.numerics.phases, most_phases)
+            plans = {}
+            for tier in [_tier(name) for name in tiers]:
                 tier.refuse(scene.system)
-                chosen[tier.name] = plan = self._plan(tier, gait, amplitudes)
-                self._refuse_singular(plan, gait, sampled, phases)
-            if any(plan.table and plan.table.axes for plan in chosen.values()):
-                refuse_outside(scene, gait, sampled, phases)
-        return gait, amplitudes, chosen
+                plan = self._plan(tier, gait, amplitudes)
+                plans[tier.name] = plan
+                self._refuse_singular(plan, gait, checked, phases)
+            if any(plan.table and plan.table.axes for plan in plans.values()):
+                refuse_outside(scene, gait, checked, phases)
+        return gait, amplitudes, plans
 
 
-def refuse_outside(
-    scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int | None = None
-) -> None:
-    """Refuse a gait, or the scene's own, that leaves the field of the tables. phases: the scene's if None."""
-    system, n, gait = scene.system, scene.numerics, scene.gait if gait is None else gait
-    field, chosen = (
-        fitted.axes(system, n),
-        np.atleast_1d(gait.amplitude if amplitudes is None else amplitudes),
-    )
-    names, phases = [name for name, _ in shape_labels(system)], phases or n.phases
-    few = max(FEW_PHASES, 64 * gait.harmonics)
-    if phases > few:
-        leaves = lambda group: _may_leave(field, *gait.cycle(few, group))[:, None]
-        chosen = chosen[
-            in_groups(leaves, chosen, gaits_per_batch(system, few))[:, 0] > 0
-        ]
-    shapes = lambda group: inside(field, gait.cycle(phases, group)[0], names)[:, 0]
-    in_groups(shapes, chosen, gaits_per_batch(system, phases))
+def _reference_first(plans: dict[str, Plan]) -> list[str]:
+    """Return the tiers of plans, the direct one first, as the reference of the others,
+    then from the last of TIERS to the first."""
+    names = [*TIERS]
+
+    def order(tier: str) -> tuple[bool, int]:
+        return not plans[tier].exact, -names.index(tier)
+
+    return sorted(plans, key=order)
 
 
-def _may_leave(field, alpha: np.ndarray, alphadot: np.ndarray) -> np.ndarray:
-    """Return (B,), whether gaits alpha, alphadot (B, N, d) may leave the field between N phases: whether they come as near
-    to its edge as they move, at twice the fastest of their rates there, in half of the time from phase to phase."""
-    step = 2 * np.pi / alpha.shape[1]
-    margin = step * np.abs(alphadot).max(1)
-    low, high = np.array([(axis[0], axis[-1]) for axis in field]).T
-    return ((alpha.min(1) - margin < low) | (alpha.max(1) + margin > high)).any(-1)
+def _evenly_sampled(values: np.ndarray, most: int) -> np.ndarray:
+    """Return at most ``most`` of values (B,), with the first and the last."""
+    count = min(len(values), most)
+    return values[np.linspace(0, len(values) - 1, count).astype(int)]
 
 
 def _tier(name: str) -> Tier:
     return TIERS[choose("tier", name, TIERS)]
 
 
-def timed(f: Callable) -> tuple[Any, float]:
-    """Return (value, seconds)."""
+def refuse_outside(
+    scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int | None = None
+) -> None:
+    """Refuse a gait, or the scene's own, that leaves the field of the tables. phases:
+    the scene's if None."""
+    system = scene.system
+    if gait is None:
+        gait = scene.gait
+    if phases is None:
+        phases = scene.numerics.phases
+    axes = fitted.axes(system, scene.numerics)
+    names = [name for name, _ in shape_labels(system)]
+    amplitudes = np.atleast_1d(gait.amplitude if amplitudes is None else amplitudes)
+
+    # Of many phases a few show which amplitudes are far from leaving the field.
+    few = max(CHECKED_PHASES, 64 * gait.harmonics)
+    if phases > few:
+
+        def may_leave(batch):
+            alpha, alphadot = gait.cycle(few, batch)
+            return _may_leave(axes, alpha, alphadot)[:, None]
+
+        near_edge = in_groups(may_leave, amplitudes, gaits_per_batch(system, few))
+        amplitudes = amplitudes[near_edge[:, 0] > 0]
+
+    def refuse_leaving(batch):
+        alpha, _ = gait.cycle(phases, batch)
+        return inside(axes, alpha, names)[:, 0]
+
+    in_groups(refuse_leaving, amplitudes, gaits_per_batch(system, phases))
+
+
+def _may_leave(
+    axes: Sequence[np.ndarray], alpha: np.ndarray, alphadot: np.ndarray
+) -> np.ndarray:
+    """Return whether gaits alpha, alphadot (B, N, d) may leave the field between N
+    phases (B,).
+
+    They may if they come as near to its edge as they move, at twice the fastest of
+    their rates there, in half of the time from phase to phase."""
+    step = 2 * np.pi / alpha.shape[1]
+    margin = step * np.abs(alphadot).max(1)
+    low = np.array([axis[0] for axis in axes])
+    high = np.array([axis[-1] for axis in axes])
+    below = alpha.min(1) - margin < low
+    above = alpha.max(1) + margin > high
+    return (below | above).any(-1)
+
+
+def timed_call(function: Callable, *args: Any) -> tuple[Any, float]:
+    """Return (function(*args), the seconds that it took)."""
     start = time.perf_counter()
-    value = f()
+    value = function(*args)
     return value, time.perf_counter() - start

@@ -238,7 +238,7 @@ def plane_ccfs(name: str, planes: Sequence[Plane]) -> list[Variable]:
     found = []
     for plane in planes:
         dims, ending = dims_of(plane), ending_of(plane)
-        units = fields.of_components(plane.ccf.unit, "rad2")
+        units = fields.component_units(plane.ccf.unit, "rad2")
         label = f"CCF of joints {plane.pair[0] + 1} and {plane.pair[1] + 1}"
         error = plane.error.values
         values = plane.ccf.values
@@ -252,7 +252,7 @@ def plane_connections(planes: Sequence[Plane]) -> list[Variable]:
     for plane in planes:
         component, *angles = dims_of(plane)
         dims = (component, "moving_joint", *angles)
-        units = fields.of_components(plane.connection.unit, "rad")
+        units = fields.component_units(plane.connection.unit, "rad")
         label = "columns of A of the joints that move"
         values = plane.connection.A
         found.append(Variable(f"A{ending_of(plane)}", dims, values, units, label))

@@ -18,24 +18,26 @@ OVER = ("tilt", "direction")
 
 
 def check(beta: float | None, gamma: float | None, mapped: bool) -> None:
-    """Refuse one angle without the other, none where no map is wanted, and angles that
-    are none."""
+    """Refuse one angle without the other, no angles without the map, and angles that
+    are not finite."""
     alone = (beta is None) != (gamma is None)
     if alone or (beta is None and not mapped):
         raise Refusal(
             "give both ``beta`` and ``gamma``, in degrees, or ``drawn`` for all angles"
         )
-    if not all(x is None or abs(x) <= LARGEST_ANGLE for x in (beta, gamma)):
-        raise Refusal(
-            "``beta`` and ``gamma`` must be finite angles in degrees, of at most 1e6"
-        )
+    for angle in (beta, gamma):
+        if angle is not None and not abs(angle) <= LARGEST_ANGLE:
+            raise Refusal(
+                "``beta`` and ``gamma`` must be finite angles in degrees, "
+                "of at most 1e6"
+            )
 
 
 def answer(
     medium: str, beta: float | None, gamma: float | None, mapped: bool
 ) -> Result:
-    """Return the stress per unit depth at one tilt and direction, degrees, the shares of
-    the plane of angles in which the map pulls and pushes, and the map itself."""
+    """Return the stress per unit depth at one tilt and direction, degrees, the shares
+    of the plane of angles in which the map pulls and pushes, and the map itself."""
     law = load_medium(medium)
     overview = survey(law)
     description = f"{medium} {overview.description()}"
@@ -43,7 +45,7 @@ def answer(
         description = f"{description}, which is cut"
     variables = []
     if beta is not None:
-        variables += at_angles(law, beta, gamma)
+        variables += angle_variables(law, beta, gamma)
     pulling = "share of angles in which it pulls on the leading face"
     pushing = "share of angles in which it drives motion on"
     variables.append(Variable("pulling", (), overview.pulling, "1", pulling))
@@ -51,14 +53,15 @@ def answer(
     if overview.pushing:
         variables.append(Variable("note", ("line",), [description]))
     if mapped:
-        variables += of_map(overview)
+        variables += map_variables(overview)
     facts = {"medium": medium, "description": description}
     return Result("stress", tuple(variables), facts)
 
 
-def at_angles(law, beta: float, gamma: float) -> list[Variable]:
+def angle_variables(law, beta: float, gamma: float) -> list[Variable]:
     """Return the stress at one tilt and direction, degrees."""
     values = law(math.radians(beta), math.radians(gamma))
+    # The sum with 0.0 turns -0.0 into 0.0.
     alpha_x, alpha_z = (np.round(float(x), 12) + 0.0 for x in values)
     return [
         Variable("beta", (), beta, "degrees", "tilt of the plate"),
@@ -68,11 +71,13 @@ def at_angles(law, beta: float, gamma: float) -> list[Variable]:
     ]
 
 
-def of_map(overview: Survey) -> list[Variable]:
+def map_variables(overview: Survey) -> list[Variable]:
     """Return a survey as variables over tilt and direction."""
     arrays = (overview.alpha_x, overview.alpha_z, overview.normal, overview.power)
     units = (UNIT, UNIT, UNIT, f"{UNIT} x speed")
-    maps = [Variable(*one) for one in zip(MAPS, (OVER,) * 4, arrays, units)]
+    maps = []
+    for name, values, unit in zip(MAPS, arrays, units):
+        maps.append(Variable(name, OVER, values, unit))
     return [
         Variable("tilt", ("tilt",), overview.beta, "rad"),
         Variable("direction", ("direction",), overview.gamma, "rad"),
@@ -81,7 +86,8 @@ def of_map(overview: Survey) -> list[Variable]:
 
 
 def drawn(result: Result) -> tuple[Survey, tuple[float, float] | None]:
-    """Return the survey of a result, and the angles that were asked for."""
+    """Return the survey of a result for its picture, and the angles (beta, gamma),
+    degrees, at which it has the stress; None without them."""
     if "map_x" not in result:
         raise Refusal("its map was not computed", instead="say ``drawn``")
     maps = [result[name].values for name in MAPS]

@@ -1,4 +1,5 @@
-"""Calibrations of the vertical plane: zeta from a penetration test, nine coefficients from plate drags."""
+"""Calibrations of the vertical plane: zeta from a penetration test, nine coefficients
+from plate drags."""
 
 from __future__ import annotations
 
@@ -27,13 +28,15 @@ from rft.fits.plates import (
 from rft.fits.rods import student_factor
 from rft.terradynamics.plates.survey import survey
 
-KEYS = tuple(
-    name.replace("m", "-") for name in COEFFICIENTS
-)  # as files have them: B-11 for Bm11
-SEEN = 3.0  # standard errors beyond which the depth of zero force is noted
+# Names of the coefficients in files: B-11 for Bm11.
+KEYS = tuple(name.replace("m", "-") for name in COEFFICIENTS)
+# A depth of zero force is noted beyond so many of its standard errors, and beyond this
+# share of the largest depth.
+NOTED_ERRORS = 3.0
+NOTED_SHARE = 0.02
 UNIT = "N/cm^3"
 INTERVAL = "half width of the interval with 95 %"
-GIVEN = "give a CSV file with columns depth_m,force_N"
+EXPECTED_FILE = "give a CSV file with columns depth_m,force_N"
 
 
 def plate_drags(
@@ -41,13 +44,14 @@ def plate_drags(
 ) -> Result:
     """Return nine coefficients fitted to a CSV file of plate drags. Refusal, one line
     that names the file, for bad ones."""
-    _refuse(law, sizes, end_caps, ())
+    _refuse_others(law, sizes, end_caps)
     beta, gamma, *alpha = plate_rows("plate drags", source)
     name = Path(source).name
     with located(name):
         f = fit_stress(np.radians(beta), np.radians(gamma), *alpha)
     undetermined = [KEYS[COEFFICIENTS.index(name)] for name in f.undetermined]
-    overview, notes = survey(f.stress), _lacking(name, f, undetermined)
+    overview = survey(f.stress)
+    notes = _undetermined_notes(name, f, undetermined)
     if overview.pushing:
         notes.append(f"{name}: the fitted map {overview.description()}")
     rms = _rms(f.residuals)
@@ -58,7 +62,11 @@ def plate_drags(
         "map": overview.description(),
         "medium_toml": _coefficients_text(f, name, rms, undetermined),
     }
-    over, rows = ("parameter",), ("component", "row")
+    over = ("parameter",)
+    rows = ("component", "row")
+    pulling = "share of angles in which the map pulls"
+    pushing = "share of angles in which it drives motion on"
+    stress = np.array(alpha)
     half_width = student_factor(f.free) * f.errors
     missing = [int(key in undetermined) for key in KEYS]
     variables = [
@@ -79,20 +87,20 @@ def plate_drags(
         ),
         Variable("zeta", (), f.zeta, "1", "of the generic set that comes nearest"),
         Variable("rms", (), rms, UNIT, "of the residuals"),
-        Variable("pulling", (), overview.pulling, "1", "share of angles in which the map pulls"),
-        Variable("pushing", (), overview.pushing, "1", "share of angles in which it drives motion on"),
+        Variable("pulling", (), overview.pulling, "1", pulling),
+        Variable("pushing", (), overview.pushing, "1", pushing),
         Variable("component", ("component",), ["alpha_x", "alpha_z"]),
         Variable("beta", ("row",), beta, "degrees", "tilt"),
         Variable("gamma", ("row",), gamma, "degrees", "direction of motion"),
-        Variable("stress", rows, np.array(alpha), UNIT, "measured, per depth"),
-        Variable("fitted", rows, np.array(alpha) - f.residuals, UNIT, "by the map"),
+        Variable("stress", rows, stress, UNIT, "measured, per depth"),
+        Variable("fitted", rows, stress - f.residuals, UNIT, "by the map"),
         Variable("residual", rows, f.residuals, UNIT, "stress minus map"),
-        *noted(notes),
+        *note_variables(notes),
     ]  # fmt: skip
     return Result("fit_medium", tuple(variables), facts)
 
 
-def noted(notes: list[str]) -> list[Variable]:
+def note_variables(notes: list[str]) -> list[Variable]:
     """Return notes as a variable, if there are any."""
     if not notes:
         return []
@@ -119,14 +127,17 @@ def _coefficients_text(
     return "\n".join(lines) + "\n"
 
 
-def _lacking(name: str, f: StressFit, undetermined: list[str]) -> list[str]:
-    """Return a note on the coefficients that the data do not determine, if there are any."""
+def _undetermined_notes(name: str, f: StressFit, undetermined: list[str]) -> list[str]:
+    """Return a note on the coefficients that the data do not determine, if there are
+    any."""
     if not undetermined:
         return []
     beta, gamma = (round(np.degrees(x)) for x in f.least_known())
     return [
-        f"{name}: these drags do not determine {', '.join(undetermined)}: what they lack is taken from the shape of the "
-        f"generic set; drag plates at other angles, least is known at beta = {beta}, gamma = {gamma} degrees"
+        f"{name}: these drags do not determine {', '.join(undetermined)}: "
+        "what they lack is taken from the shape of the generic set; "
+        "drag plates at other angles, least is known at "
+        f"beta = {beta}, gamma = {gamma} degrees"
     ]
 
 
@@ -135,15 +146,20 @@ def penetration_test(
 ) -> Result:
     """Return zeta fitted to a plate that was pushed straight down, from a CSV file.
 
-    sizes: "area", m^2, which overrules the file's. Refusal, one line that names the file, for bad ones."""
-    _refuse(law, sizes, end_caps, ("area",))
-    test = penetration.read(read_rows(source, LARGEST_FILE, GIVEN))
-    area = np.array([sizes["area"]]) if "area" in sizes else test.area
+    sizes: "area", m^2, which overrules the file's. Refusal, one line that names the
+    file, for bad ones."""
+    _refuse_others(law, sizes, end_caps, own=("area",))
+    test = penetration.read(read_rows(source, LARGEST_FILE, EXPECTED_FILE))
+    area = test.area
+    if "area" in sizes:
+        area = np.array([sizes["area"]])
     with located(test.name):
         if area is None:
             raise Refusal(
                 "the area of the plate is missing",
-                instead="give ``area`` in m^2, or a header line '# plate area = 9.5 cm^2'",
+                instead=(
+                    "give ``area`` in m^2, or a header line '# plate area = 9.5 cm^2'"
+                ),
             )
         f = fit_zeta(test.depth, test.force, area)
     rms = _rms(f.force - f.law)
@@ -153,7 +169,8 @@ def penetration_test(
         "medium_toml": _zeta_text(f, test.name, rms),
     }
     half_width = f.interval[1] - f.zeta
-    areas = np.unique(area) if np.ptp(area) == 0 else area
+    if np.ptp(area) == 0:
+        area = np.unique(area)
     label = "on a level plate that is pushed down"
     band = f.law * (f.interval[1] / f.zeta - 1)
     variables = [
@@ -169,14 +186,14 @@ def penetration_test(
         ),
         Variable("downward_stress", (), f.zeta, UNIT, label),
         Variable("rms", (), rms, "N", "of the residuals"),
-        Variable("area", ("plate",), areas, "m^2", "of the plate"),
+        Variable("area", ("plate",), area, "m^2", "of the plate"),
         Variable("depth", ("row",), f.depth, "m"),
         Variable("force", ("row",), f.force, "N", "measured"),
         Variable(
             "fitted", ("row",), f.law, "N", "by zeta", band, error_label=INTERVAL
         ),
         Variable("residual", ("row",), f.force - f.law, "N", "force minus law"),
-        *noted(_shifted(test.name, f)),
+        *note_variables(_zero_depth_notes(test.name, f)),
     ]  # fmt: skip
     if np.isfinite(f.zero):
         label = "where a straight line through the forces is zero"
@@ -196,13 +213,16 @@ def _zeta_text(f: ZetaFit, name: str, rms: float) -> str:
     )
 
 
-def _shifted(name: str, f: ZetaFit) -> list[str]:
+def _zero_depth_notes(name: str, f: ZetaFit) -> list[str]:
     """Return a note if the force is zero at another depth than zero."""
-    if not (abs(f.zero) > SEEN * f.zero_error and abs(f.zero) > 0.02 * f.depth[-1]):
+    shift = abs(f.zero)
+    if not (shift > NOTED_ERRORS * f.zero_error and shift > NOTED_SHARE * f.depth[-1]):
         return []
     return [
-        f"{name}: a straight line through the forces is zero at a depth of {1e3 * f.zero:.3g} mm: if the surface is there, "
-        "count depth from it; if not, the force is not in proportion to depth, and zeta holds for these depths alone"
+        f"{name}: a straight line through the forces is zero at a depth of "
+        f"{1e3 * f.zero:.3g} mm: if the surface is there, count depth from it; "
+        "if not, the force is not in proportion to depth, "
+        "and zeta holds for these depths alone"
     ]
 
 
@@ -210,12 +230,18 @@ def _rms(residuals: np.ndarray) -> float:
     return float(np.sqrt(np.mean(residuals**2)))
 
 
-def _refuse(
-    law: str, sizes: Mapping[str, float], end_caps, known: tuple[str, ...]
+def _refuse_others(
+    law: str,
+    sizes: Mapping[str, float],
+    end_caps: float | str,
+    own: tuple[str, ...] = (),
 ) -> None:
-    """Refuse options that belong to a rod."""
-    for name in (*sizes, *(["end_caps"] if end_caps else [])):
-        if name not in known:
+    """Refuse options of a rod. own: sizes of this measurement."""
+    names = [*sizes]
+    if end_caps:
+        names.append("end_caps")
+    for name in names:
+        if name not in own:
             raise Refusal(
                 f"``{name}`` belongs to another measurement",
                 instead=f"leave it out for ``law`` {law}",
@@ -223,7 +249,8 @@ def _refuse(
 
 
 def law_of(source: str) -> str:
-    """Return the law that the columns of a file determine; "granular" for a file that cannot be read."""
+    """Return the law that the columns of a file determine; "granular" for a file that
+    cannot be read."""
     try:
         rows = read_rows(source, LARGEST_FILE, "")
     except ValueError:
@@ -233,4 +260,6 @@ def law_of(source: str) -> str:
         return "granular"
     if any(word.startswith(("alpha_", "beta")) for word in words):
         return "stress-map"
-    return "zeta" if penetration.is_penetration(rows) else "granular"
+    if penetration.is_penetration(rows):
+        return "zeta"
+    return "granular"
