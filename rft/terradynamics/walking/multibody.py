@@ -233,7 +233,7 @@ def bed_under(
         require(geom >= 0, f"the body {surface.body} of a surface has no geom")
         own.setdefault(geom, []).append(surface)
     along = [_faces_of_geom(model, geom, parts) for geom, parts in own.items()]
-    return Bed.under_faces(
+    return Bed.from_faces(
         model, [*own], along, (grains.law,), EVERYWHERE, grains.ground
     )
 
