@@ -133,7 +133,7 @@ def test_forces_are_those_of_the_meshes_and_do_their_virtual_work(name, law, sol
     with rft.mujoco.attach(
         model, law, element=0.02, slope=0.2, effects=effects
     ) as sand:
-        cut = meshes(model, sand._bed.geoms, 0.02)
+        cut = meshes(model, sand._bed.geoms.ids, 0.02)
         for _ in range(3):
             data.qpos[:] += 0.3 * rng.normal(size=model.nq)
             data.qvel[:] = rng.normal(size=model.nv)
@@ -145,7 +145,7 @@ def test_forces_are_those_of_the_meshes_and_do_their_virtual_work(name, law, sol
                 np.zeros(model.nv),
             )
             for k, (geom, body, mesh) in enumerate(
-                zip(sand._bed.geoms, sand._bed.bodies, cut)
+                zip(sand._bed.geoms.ids, sand._bed.geoms.bodies, cut)
             ):
                 motion = np.zeros(6)
                 mujoco.mj_objectVelocity(

@@ -19,6 +19,7 @@ from rft.mujoco import (
     compiled_parts,
     compiled_solver,
     equations,
+    hills,
 )
 from rft.mujoco.addresses import FARTHEST
 from rft.mujoco.c_calls import (
@@ -50,7 +51,6 @@ from rft.mujoco.footprints import (
     memory_of,
     remember,
 )
-from rft.mujoco.hills import tangent_plane
 from rft.mujoco.implicit import COARSER, UNSOLVED
 from rft.mujoco.layout import (
     AT,
@@ -75,7 +75,7 @@ from rft.terradynamics.meshes.zones import Zones
 
 LAYOUT = len(NAMES)
 for function in (
-    tangent_plane,
+    *hills.COMPILED,
     *COMPILED,
     *equations.COMPILED,
 ):
@@ -92,7 +92,8 @@ def _frames(row, fields, levels):
     xpos = numbers_at(fields[AT.geom_xpos], (row[AT.ngeom], 3))
     xmat = numbers_at(fields[AT.geom_xmat], (row[AT.ngeom], 3, 3))
     surface = numbers_at(row[AT.surface], 7)
-    hills = numbers_at(row[AT.hills], (row[AT.hill_rows], row[AT.hill_columns], 3))
+    hill_shape = (row[AT.hill_rows], row[AT.hill_columns], 3)
+    hill_grid = numbers_at(row[AT.hills], hill_shape)
     hill_frame = numbers_at(row[AT.hill_frame], 7)
     ups, aheads = np.empty((count, 3)), np.empty((count, 3))
     xs, heights, middles = np.empty(count), np.empty(count), np.empty((count, 3))
@@ -107,7 +108,9 @@ def _frames(row, fields, levels):
             for j in range(3):
                 middles[g, i] += turn[i, j] * sphere[j]
         if row[AT.hill_rows] > 0:
-            up, level = tangent_plane(hills, hill_frame, middles[g, 0], middles[g, 1])
+            up, level = hills.tangent_plane(
+                hill_grid, hill_frame, middles[g, 0], middles[g, 1]
+            )
         heights[g], xs[g], distance = -level, 0.0, -level
         if len(levels) > 0:
             heights[g] -= up[2] * levels[g]
@@ -142,7 +145,7 @@ def _is_unchanged(row):
     """Return whether the geoms are as their elements were made for."""
     count = row[AT.n_geoms]
     geoms = integers_at(row[AT.geoms], (count, 3))
-    form = numbers_at(row[AT.form], (count, 5))
+    form = numbers_at(row[AT.shapes], (count, 5))
     sizes = numbers_at(row[AT.geom_size], (row[AT.ngeom], 3))
     kinds = short_integers_at(row[AT.geom_type], row[AT.ngeom])
     meshes = short_integers_at(row[AT.geom_dataid], row[AT.ngeom])

@@ -1,4 +1,5 @@
-"""The error of a run in sand, by two runs more: one with steps half as long, one with elements half as long."""
+"""The error of a run in sand, by two more runs: one with steps half as long, one with
+elements half as long."""
 
 from __future__ import annotations
 
@@ -16,16 +17,19 @@ from rft.terradynamics.meshes.blocks import Blocks
 from rft.terradynamics.meshes.contact import faces
 from rft.terradynamics.meshes.geoms import mesh_of_elements
 
-# A difference d of runs at lengths h and h / 2 leaves the error d / (1 - 2^-p) of the first, p the order.
-ORDER_OF_STEPS, ORDER_OF_ELEMENTS = 1, 2
+# A difference d of runs at lengths h and h / 2 leaves the error d / (1 - 2^-p) of the
+# first, p the order.
+ORDER_OF_STEPS = 1
+ORDER_OF_ELEMENTS = 2
 Control = Callable[[mujoco.MjModel, mujoco.MjData], None]
 
 
 class RunError(NamedTuple):
-    """Errors of where the geoms in the sand are after a run, m, the largest of all geoms.
+    """Errors of the places of the geoms in the sand after a run, m, the largest of all
+    geoms.
 
-    step: of the time step, which is of order 1. elements: of their length, of order 2. moved: how far the geom has moved
-    that moved farthest, m."""
+    step: of the time step, which is of order 1. elements: of their length, of order 2.
+    moved: the farthest distance that a geom has moved, m."""
 
     step: float
     elements: float
@@ -41,22 +45,21 @@ def error_of_run(
     hulls: bool,
     element: float | None = None,
 ) -> RunError:
-    """Return `rft.mujoco.sand.Sand.error`."""
+    """Return the errors of `rft.mujoco.sand.Sand.error`."""
     state = _state(model, data)
-    start = _places(model, bed, state, 0.0, 1, None)
-    plain = _places(model, bed, state, seconds, 1, control)
-    halved = _places(model, bed, state, seconds, 2, control)
-    finer = _places(
-        model, _finer(model, bed, hulls, element), state, seconds, 1, control
-    )
+    half_elements = _with_half_elements(model, bed, hulls, element)
+    start = _places_after(model, bed, state, 0.0, 1, None)
+    plain = _places_after(model, bed, state, seconds, 1, control)
+    half_steps = _places_after(model, bed, state, seconds, 2, control)
+    finer = _places_after(model, half_elements, state, seconds, 1, control)
     return RunError(
-        _largest(plain, halved) / (1 - 2.0**-ORDER_OF_STEPS),
-        _largest(plain, finer) / (1 - 2.0**-ORDER_OF_ELEMENTS),
-        _largest(plain, start),
+        _largest_distance(plain, half_steps) / (1 - 2.0**-ORDER_OF_STEPS),
+        _largest_distance(plain, finer) / (1 - 2.0**-ORDER_OF_ELEMENTS),
+        _largest_distance(plain, start),
     )
 
 
-def _largest(places: np.ndarray, others: np.ndarray) -> float:
+def _largest_distance(places: np.ndarray, others: np.ndarray) -> float:
     """Return the largest distance between places (G, 3), m."""
     return float(np.linalg.norm(places - others, axis=1).max())
 
@@ -69,31 +72,46 @@ def _state(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     return state
 
 
-def _places(model, bed: Bed, state, seconds: float, share: int, control) -> np.ndarray:
-    """Return where the geoms are, (G, 3), after a run from a state with the ``share``-th part of the time step."""
+def _places_after(
+    model: mujoco.MjModel,
+    bed: Bed,
+    state: np.ndarray,
+    seconds: float,
+    substeps: int,
+    control: Control | None,
+) -> np.ndarray:
+    """Return the places of the geoms, (G, 3), m, after a run from a state with each time
+    step in ``substeps`` parts."""
     own = copy.copy(model)
-    own.opt.timestep = model.opt.timestep / share
+    own.opt.timestep = model.opt.timestep / substeps
     data = mujoco.MjData(own)
     mujoco.mj_setState(own, data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
+    steps = substeps * round(seconds / model.opt.timestep)
     row = installed.install(own, bed)
     try:
-        steps = share * round(seconds / model.opt.timestep)
-        for _ in range(steps if control else 0):
-            control(own, data)
-            mujoco.mj_step(own, data)
-        if not control and steps:
+        if control:
+            for _ in range(steps):
+                control(own, data)
+                mujoco.mj_step(own, data)
+        elif steps:
             mujoco.mj_step(own, data, steps)
         mujoco.mj_kinematics(own, data)
-        return data.geom_xpos[bed.geoms].copy()
+        return data.geom_xpos[bed.geoms.ids].copy()
     finally:
         installed.remove(row)
 
 
-def _finer(model: mujoco.MjModel, bed: Bed, hulls: bool, element: float | None) -> Bed:
-    """Return the bed with elements half as long on each geom, in all directions. element: m, of edges; None for those that
-    the shapes ask for."""
-    half, own = element and element / 2, []
-    for geom in bed.geoms:
-        mesh = mesh_of_elements(model, int(geom), half, hulls, 1.0 if half else 0.5)
-        own.append(faces(mesh.vertices[mesh.faces], mesh.middle_normals))
-    return replace(bed, blocks=Blocks(own))
+def _with_half_elements(
+    model: mujoco.MjModel, bed: Bed, hulls: bool, element: float | None
+) -> Bed:
+    """Return the bed with elements half as long on each geom. element: m, of edges; None
+    for those that the shapes ask for."""
+    if element:
+        half, share = element / 2, 1.0
+    else:
+        half, share = None, 0.5
+    own_faces = []
+    for geom in bed.geoms.ids:
+        mesh = mesh_of_elements(model, int(geom), half, hulls, share)
+        own_faces.append(faces(mesh.vertices[mesh.faces], mesh.middle_normals))
+    return replace(bed, blocks=Blocks(own_faces))

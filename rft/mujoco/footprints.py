@@ -111,14 +111,23 @@ class Prints(NamedTuple):
     first: np.ndarray
 
     @property
-    def numbers(self) -> int:
+    def userdata_size(self) -> int:
         """How many numbers of userdata hold the memory."""
         return HEAD + PER_GEOM * self.geoms + PER_CELL * math.prod(self.shape)
+
+    @property
+    def cell_middles(self) -> tuple[np.ndarray, np.ndarray]:
+        """Places x (C,) and y (R,) of the middles of the cells, m."""
+        rows, columns = self.shape
+        x_0, y_0, spacing = self.grid[:3]
+        x = x_0 + spacing * (np.arange(columns) + 0.5)
+        y = y_0 + spacing * (np.arange(rows) + 0.5)
+        return x, y
 
     def memory(self, userdata: np.ndarray) -> Memory:
         """Return the memory in the userdata (N,) of a simulation."""
         return memory_of(
-            userdata[len(userdata) - self.numbers :], self.geoms, *self.shape
+            userdata[len(userdata) - self.userdata_size :], self.geoms, *self.shape
         )
 
 

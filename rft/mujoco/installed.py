@@ -25,7 +25,7 @@ from rft.mujoco import numpy_step
 from rft.mujoco.addresses import check_places, functions, places, takes_data
 from rft.mujoco.bed import Bed
 from rft.mujoco.footprints import Prints
-from rft.mujoco.implicit import ACCURACY, SOLVED, UNSOLVED
+from rft.mujoco.implicit import ACCURACY, COARSER, UNSOLVED, Result
 from rft.mujoco.layout import (
     COARSER_STEPS,
     GEOM,
@@ -46,8 +46,8 @@ from rft.mujoco.model_parts import ModelParts
 from rft.terradynamics.meshes.contact import record
 
 ROWS = 4096  # beds of sand at one time
-# layouts of detached beds that are kept, for a step of another thread that is still
-# under way
+# Layouts of detached beds that are kept, for a step of another thread that is still
+# under way.
 RETIRED = 64
 REMOVED = -1  # in place of a model's address
 
@@ -63,7 +63,7 @@ class Layout(NamedTuple):
 
 
 class Effort(NamedTuple):
-    """What the steps of a bed have cost so far.
+    """Cost of the steps of a bed so far.
 
     steps: with a geom in the ground. iterations: of Newton's method, and
     most_iterations in a step. coarser: steps that were solved loosely, within 3e-4, or
@@ -78,10 +78,11 @@ class Effort(NamedTuple):
     residual: float
 
 
-class Seen(NamedTuple):
-    """What the grains do in a step: residual, status and rounding as of
-    `rft.mujoco.implicit.Result`; wrenches and twists at its end (G, 6), along the
-    geoms' axes."""
+class Observation(NamedTuple):
+    """What the grains do in one step.
+
+    residual, status, rounding: as of `rft.mujoco.implicit.Result`. wrenches, twists:
+    (G, 6), along the geoms' axes, at the end of the step."""
 
     residual: float
     status: int
@@ -91,27 +92,28 @@ class Seen(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """A bed in a row of the table. parts: of its model. bed: the sand. form: (G, 5), of its geoms as their elements were
-    made for. layout: for compiled code. counts: (N_COUNTS,), of steps. largest: (1,), of their residuals. end: removes
-    the bed when the model is gone."""
+    """A bed in a row of the table.
+
+    parts: of its model. shapes: (G, 5), numbers of its geoms that the elements were
+    made for. layout: for compiled code. counts: (N_COUNTS,), of steps. largest: (1,),
+    of their residuals. finalizer: removes the bed when the model is gone."""
 
     parts: ModelParts
     bed: Bed
-    form: np.ndarray
+    shapes: np.ndarray
     layout: Layout | None
     counts: np.ndarray
     largest: np.ndarray
-    end: weakref.finalize
+    finalizer: weakref.finalize
 
 
 _entries: dict[int, Entry] = {}
 _retired: deque[Entry] = deque(maxlen=RETIRED)
 _lock = threading.RLock()
 _active: list = []  # the callback that is installed, and what it needs
-_watching: dict[
-    int, int
-] = {}  # addresses of data whose next step is to be seen, by row
-_seen_by_python: dict[int, np.ndarray] = {}
+# Addresses of data whose next step is observed, by row.
+_observed_data: dict[int, int] = {}
+_observed_by_python: dict[int, np.ndarray] = {}
 
 
 def install(model: mujoco.MjModel, bed: Bed) -> int:
@@ -120,43 +122,56 @@ def install(model: mujoco.MjModel, bed: Bed) -> int:
     with _lock:
         compiled = serves_compiled()
         check_places(mujoco.MjData(model))
-        parts, counts = ModelParts.of(model), np.zeros(N_COUNTS, np.int64)
+        parts = ModelParts.of(model)
+        counts = np.zeros(N_COUNTS, np.int64)
         largest = np.zeros(1)
-        layout = layout_of(parts, bed, counts, largest) if compiled else None
+        layout = None
+        if compiled:
+            layout = layout_of(parts, bed, counts, largest)
         _set_callback(compiled)
-        row = next((k for k in range(ROWS) if TABLE[k, 0] in (0, REMOVED)), ROWS)
-        require(row < ROWS, f"{ROWS} beds of sand are in use", instead="detach some")
-        end = weakref.finalize(model, remove, row)
-        end.atexit = False
-        form = parts.form(bed.geoms)
-        _entries[row] = Entry(parts, bed, form, layout, counts, largest, end)
+
+        row = _free_row()
+        finalizer = weakref.finalize(model, remove, row)
+        finalizer.atexit = False
+        shapes = parts.shape_numbers(bed.geoms.ids)
+        _entries[row] = Entry(parts, bed, shapes, layout, counts, largest, finalizer)
         if layout:
             from rft.mujoco.compiled import kernel
 
-            TABLE[row, 1:] = kernel().address, layout.numbers.ctypes.data
+            TABLE[row, 1] = kernel().address
+            TABLE[row, 2] = layout.numbers.ctypes.data
+        # Last, so that a step of another thread finds a row that is complete.
         TABLE[row, 0] = model._address
         return row
+
+
+def _free_row() -> int:
+    """Return the first row of the table without a bed; Refusal where all have one."""
+    free = np.flatnonzero((TABLE[:ROWS, 0] == 0) | (TABLE[:ROWS, 0] == REMOVED))
+    require(free.size > 0, f"{ROWS} beds of sand are in use", instead="detach some")
+    return int(free[0])
 
 
 def remove(row: int) -> None:
     """Take a bed out of the table; the last one takes the callback with it."""
     with _lock:
-        if (entry := _entries.pop(row, None)) is None:
+        entry = _entries.pop(row, None)
+        if entry is None:
             return
         TABLE[row, 0] = REMOVED
-        entry.end.detach()
+        entry.finalizer.detach()
         _retired.append(entry)
         if not _entries:
             _clear_callback()
 
 
-def change(row: int, bed: Bed) -> None:
+def replace_bed(row: int, bed: Bed) -> None:
     """Give a row a bed with another law of the same form, without compiling."""
     with _lock:
         entry = _entries[row]
         _entries[row] = entry._replace(bed=bed)
         if entry.layout:
-            entry.layout.arrays["laws"][:] = _laws(bed)
+            entry.layout.arrays["laws"][:] = _law_numbers(bed)
 
 
 def is_installed(row: int) -> bool:
@@ -174,35 +189,36 @@ def beds(model: mujoco.MjModel) -> list[Bed]:
 
 
 def effort(row: int) -> Effort:
-    """Return what the steps of the bed of a row have cost so far; zeros for one that is
-    removed."""
+    """Return the cost of the steps of a row's bed so far; zeros for a removed one."""
     entry = _entries.get(row)
     if entry is None:
         return Effort(*[0] * N_COUNTS, residual=0.0)
     return Effort(*entry.counts.tolist(), residual=float(entry.largest[0]))
 
 
-def see(row: int, model: mujoco.MjModel, data: mujoco.MjData) -> Seen:
-    """Return what the grains do in the step that begins at data that are up to date."""
+def observe(row: int, model: mujoco.MjModel, data: mujoco.MjData) -> Observation:
+    """Return what the grains do in the step that begins at up-to-date data."""
     with _lock:
         entry = _entries[row]
         count = len(entry.bed.geoms)
+        # Zeros and the bed's own rounding stay where no geom is in the ground.
         watched = np.zeros(WATCHED_HEAD + 12 * count)
         watched[WATCHED_ROUNDING] = entry.bed.ground.rounding
         if entry.layout:
             entry.layout.arrays["watched"][:] = watched
             entry.layout.arrays["watch"][0] = data._address
-        _watching[row] = data._address
+        _observed_data[row] = data._address
         try:
             mujoco.mj_passive(model, data)
         finally:
-            del _watching[row]
+            del _observed_data[row]
             if entry.layout:
                 entry.layout.arrays["watch"][0] = 0
-        watched = entry.layout.arrays["watched"].copy() if entry.layout else watched
-        watched = _seen_by_python.pop(row, watched)
+        if entry.layout:
+            watched = entry.layout.arrays["watched"].copy()
+        watched = _observed_by_python.pop(row, watched)
         wrenches, twists = np.split(watched[WATCHED_HEAD:].reshape(count, 12), 2, 1)
-        return Seen(
+        return Observation(
             float(watched[WATCHED_RESIDUAL]),
             int(watched[WATCHED_STATUS]),
             float(watched[WATCHED_ROUNDING]),
@@ -213,25 +229,23 @@ def see(row: int, model: mujoco.MjModel, data: mujoco.MjData) -> Seen:
 
 def serves_compiled() -> bool:
     """Return whether the callback is compiled code, or would be."""
-    return (
-        next(iter(_entries.values())).layout is not None
-        if _entries
-        else compiles("auto", ())
-    )
+    for entry in _entries.values():
+        return entry.layout is not None
+    return compiles("auto", ())
 
 
 def _set_callback(compiled: bool) -> None:
     """Install the callback; Refusal if there is another one."""
-    now = mujoco.get_mjcb_passive()
-    if _active and now is _active[0]:
+    present = mujoco.get_mjcb_passive()
+    if _active and present is _active[0]:
         return
     require(
-        now is None,
+        present is None,
         "another passive callback is installed",
         because="MuJoCo has one for all models",
         instead="mujoco.set_mjcb_passive(None)",
     )
-    _active[:] = _compiled_callback() if compiled else [_by_python]
+    _active[:] = _compiled_callback() if compiled else [_python_callback]
     mujoco.set_mjcb_passive(_active[0])
 
 
@@ -254,14 +268,15 @@ def _compiled_callback() -> tuple:
 
 
 @ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
-def _by_python(model: int, data: int) -> None:
+def _python_callback(model: int, data: int) -> None:
     """Add the forces of all beds under the model at an address, without numba. A fault
-    detaches its bed and is told in one line. MuJoCo's own callbacks of Python let no
-    other model be compiled; this one, of addresses alone, does."""
+    detaches its bed with a warning of one line."""
+    # A callback of addresses, through ctypes: with one of MuJoCo's own Python callbacks
+    # installed, no other model could be compiled.
     for row, entry in [*_entries.items()]:
         if entry.parts.address == model:
             try:
-                _add_by_python(row, entry, data)
+                _add_forces_by_python(row, entry, data)
             except Exception as error:
                 remove(row)
                 warnings.warn(
@@ -271,68 +286,78 @@ def _by_python(model: int, data: int) -> None:
                 )
 
 
-def _add_by_python(row: int, entry: Entry, data: int) -> None:
-    """Add the forces of a bed, and keep what is seen of them or count the step."""
-    now = entry.parts.form(entry.bed.geoms)
-    if not np.array_equal(now, entry.form):
+def _add_forces_by_python(row: int, entry: Entry, data: int) -> None:
+    """Add the forces of a bed; store them if the step is observed, else count it."""
+    bed = entry.bed
+    shapes = entry.parts.shape_numbers(bed.geoms.ids)
+    if not np.array_equal(shapes, entry.shapes):
         remove(row)
-        _warn_changed(entry.bed, now, entry.form)
+        _warn_changed(bed, shapes, entry.shapes)
         return
-    found = numpy_step.add_forces(entry.bed, entry.parts, data)
-    if found is None:
+    step = numpy_step.add_forces(bed, entry.parts, data)
+    if step is None:
         return
-    result, geom, wrenches, twists = found
-    if _watching.get(row) == data:
+    result, geom, wrenches, twists = step
+    if _observed_data.get(row) == data:
         head = [result.residual, result.status, result.rounding]
         both = np.concatenate([wrenches, twists], 1)
-        _seen_by_python[row] = np.concatenate([head, both.ravel()])
+        _observed_by_python[row] = np.concatenate([head, both.ravel()])
         return
+    is_first_unsolved = _count_step(entry, result)
+    if is_first_unsolved:
+        time = numpy_step.Arrays(data, entry.parts.sizes).time
+        _warn_unsolved(time, result.residual, bed.geoms.names[geom])
+
+
+def _count_step(entry: Entry, result: Result) -> bool:
+    """Count a step of a bed, and return whether it is the first that is not solved."""
     counts = entry.counts
     counts[STEPS] += 1
     counts[ITERATIONS] += result.iterations
     counts[MOST_ITERATIONS] = max(counts[MOST_ITERATIONS], result.iterations)
     entry.largest[0] = max(entry.largest[0], result.residual)
-    if result.status != SOLVED:
-        is_unsolved = result.status == UNSOLVED
-        counts[UNSOLVED_STEPS if is_unsolved else COARSER_STEPS] += 1
-        if is_unsolved and counts[UNSOLVED_STEPS] == 1:
-            time = numpy_step.Arrays(data, entry.parts.sizes).time
-            _tell(time, result.residual, entry.bed.names[geom])
+    if result.status == COARSER:
+        counts[COARSER_STEPS] += 1
+    if result.status != UNSOLVED:
+        return False
+    counts[UNSOLVED_STEPS] += 1
+    return bool(counts[UNSOLVED_STEPS] == 1)
 
 
 @ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
-def _tell_unsolved(_data: int, unsolved: int) -> None:
-    """Tell once that a step of a bed is not solved; compiled code calls this with the
-    address of what it says."""
+def _report_unsolved(_data: int, unsolved: int) -> None:
+    """Warn about the first step of a bed that is not solved; compiled code calls this
+    with the address of the array "unsolved" of its layout."""
     for entry in [*_entries.values()]:
         layout = entry.layout
         if layout and layout.arrays["unsolved"].ctypes.data == unsolved:
-            said = layout.arrays["unsolved"]
-            _tell(said[TIME], said[RESIDUAL], entry.bed.names[int(said[GEOM])])
+            facts = layout.arrays["unsolved"]
+            name = entry.bed.geoms.names[int(facts[GEOM])]
+            _warn_unsolved(facts[TIME], facts[RESIDUAL], name)
 
 
 @ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
-def _tell_changed(_data: int, layout: int) -> None:
+def _report_changed(_data: int, layout: int) -> None:
     """Detach a bed with a geom that has changed; compiled code calls this with the
     address of its layout."""
     for row, entry in [*_entries.items()]:
         if entry.layout and entry.layout.numbers.ctypes.data == layout:
             remove(row)
-            now, before = entry.parts.form(entry.bed.geoms), entry.layout.arrays["form"]
-            _warn_changed(entry.bed, now, before)
+            shapes = entry.parts.shape_numbers(entry.bed.geoms.ids)
+            _warn_changed(entry.bed, shapes, entry.shapes)
 
 
-def _warn_changed(bed: Bed, now: np.ndarray, before: np.ndarray) -> None:
-    """Warn that a bed is detached since a geom has changed."""
-    first = int(np.flatnonzero((now != before).any(1))[0])
+def _warn_changed(bed: Bed, shapes: np.ndarray, before: np.ndarray) -> None:
+    """Warn that a bed is detached because a geom has changed."""
+    first = int(np.flatnonzero((shapes != before).any(1))[0])
     line = (
-        f"the sand is detached: the geom {bed.names[first]} changed after attach:"
+        f"the sand is detached: the geom {bed.geoms.names[first]} changed after attach:"
         " attach it anew"
     )
     warnings.warn(line, Note, stacklevel=2)
 
 
-def _tell(time: float, residual: float, geom: str) -> None:
+def _warn_unsolved(time: float, residual: float, geom: str) -> None:
     """Warn about a step that is not solved."""
     line = (
         f"the step at {time:.6g} s is not solved: the forces, of which the grains'"
@@ -348,80 +373,125 @@ def layout_of(
     """Return the layout of a bed under a model, whose steps write `Entry.counts` and
     `Entry.largest`."""
     from rft.mujoco.compiled import kernel
-    from rft.mujoco.compiled_parts import element_code
-    from rft.mujoco.compiled_solver import solver_code
 
     kernel()
-    (table, first), ground = bed.blocks.rows, bed.ground
-    moved, count = bed.moved_by, len(bed.geoms)
+    arrays = _bed_arrays(parts, bed)
+    arrays |= {
+        "counts": counts,
+        "largest": largest,
+        "watch": np.zeros(1, np.int64),
+        "watched": np.zeros(WATCHED_HEAD + 12 * len(bed.geoms)),
+        "unsolved": np.zeros(3),
+    }
+    arrays = {name: np.ascontiguousarray(x) for name, x in arrays.items()}
+
+    values = _bed_sizes(bed, arrays)
+    values |= _model_numbers(parts)
+    values |= _data_places()
+    values |= _function_addresses(bed)
+    values |= {name: x.ctypes.data for name, x in arrays.items()}
+    if bed.prints:
+        values |= _print_numbers(parts, bed.prints)
+    numbers = np.array([values.get(name, 0) for name in NAMES], np.int64)
+    return Layout(numbers, arrays)
+
+
+def _bed_arrays(parts: ModelParts, bed: Bed) -> dict[str, np.ndarray]:
+    """Return the arrays of a bed and of its model's structure that a step reads."""
+    table, first = bed.blocks.rows
+    ground = bed.ground
+    geoms = bed.geoms
+    surface = bed.surface
     arrays = {
         "table": table,
         "row_spheres": bed.blocks.row_spheres,
         "first": first.astype(np.int64),
-        "geoms": np.stack([bed.geoms, bed.bodies, bed.roots], -1),
-        "spheres": bed.spheres,
-        "dofs": np.concatenate([np.flatnonzero(one) for one in moved]).astype(np.int64),
-        "first_dof": np.concatenate([[0], np.cumsum(moved.sum(1))]).astype(np.int64),
+        "geoms": np.stack([geoms.ids, geoms.bodies, geoms.roots], -1),
+        "spheres": geoms.spheres,
+        "dofs": np.concatenate([np.flatnonzero(one) for one in geoms.moved_by]),
+        "first_dof": np.concatenate([[0], np.cumsum(geoms.moved_by.sum(1))]),
         "bodies": parts.bodies,
         "parents": parts.parents,
         "trees": parts.trees,
-        "laws": _laws(bed),
-        "form": parts.form(bed.geoms),
+        "laws": _law_numbers(bed),
+        "shapes": parts.shape_numbers(geoms.ids),
         "ground": np.array([*ground[:5], ground.rounding, ACCURACY]),
         "disturbed": np.array(ground.disturbed, float),
-        "surface": np.array([*bed.up, *bed.ahead, bed.level]),
-        "hills": bed.hills.grid,
-        "hill_frame": bed.hills.frame,
+        "surface": np.array([*surface.up, *surface.ahead, surface.level]),
+        "hills": surface.hills.grid,
+        "hill_frame": surface.hills.frame,
         "planes": bed.zones.planes,
         "first_plane": bed.zones.first,
         "derivative_rows": parts.derivative_rows,
         "derivative_columns": parts.derivative_columns,
-        "counts": counts,
-        "largest": largest,
-        "watch": np.zeros(1, np.int64),
-        "watched": np.zeros(WATCHED_HEAD + 12 * count),
-        "unsolved": np.zeros(3),
     }
+    for name in ("dofs", "first_dof"):
+        arrays[name] = arrays[name].astype(np.int64)
     if bed.prints:
-        names = "print_grid", "print_surface", "print_points", "print_first"
-        arrays |= dict(zip(names, bed.prints[2:]))
-    arrays = {name: np.ascontiguousarray(x) for name, x in arrays.items()}
-    where = places()
-    values = {name: parts.sizes[name] for name in ("nv", "ngeom", "nbody", "is_sparse")}
-    values |= {
-        "n_table": len(table),
-        "n_geoms": count,
+        arrays |= {
+            "print_grid": bed.prints.grid,
+            "print_surface": bed.prints.surface,
+            "print_points": bed.prints.points,
+            "print_first": bed.prints.first,
+        }
+    return arrays
+
+
+def _bed_sizes(bed: Bed, arrays: dict[str, np.ndarray]) -> dict[str, int]:
+    """Return the sizes of a bed's arrays."""
+    return {
+        "n_table": len(arrays["table"]),
+        "n_geoms": len(bed.geoms),
         "n_dofs": len(arrays["dofs"]),
-        "n_derivative": parts.sizes["nD"],
         "disturbed_rows": arrays["disturbed"].shape[0],
         "disturbed_columns": arrays["disturbed"].shape[1],
-        "hill_rows": bed.hills.grid.shape[0],
-        "hill_columns": bed.hills.grid.shape[1],
+        "hill_rows": arrays["hills"].shape[0],
+        "hill_columns": arrays["hills"].shape[1],
         "n_zones": len(bed.laws),
         "n_planes": len(bed.zones.planes),
         "n_numbers": arrays["laws"].shape[1],
-        "element_code": element_code(_form(bed)).address,
-        "solver_code": solver_code().address,
+    }
+
+
+def _model_numbers(parts: ModelParts) -> dict[str, int]:
+    """Return sizes of a model, and addresses in its memory."""
+    numbers = {name: parts.sizes[name] for name in ("nv", "ngeom", "nbody")}
+    return numbers | {
+        "is_sparse": parts.sizes["is_sparse"],
+        "n_derivative": parts.sizes["nD"],
         "model": parts.address,
         "timestep": parts.timestep,
         "integrator": parts.integrator,
         "disableflags": parts.disableflags,
         "damping": parts.damping,
-        "full_takes_data": takes_data(),
-        "no_euler_damping": int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP),
         "geom_size": parts.geom_size,
         "geom_type": parts.geom_type,
         "geom_dataid": parts.geom_dataid,
-        "report": ctypes.cast(_tell_unsolved, ctypes.c_void_p).value,
-        "report_changed": ctypes.cast(_tell_changed, ctypes.c_void_p).value,
-        "time": where.time,
+        "full_takes_data": takes_data(),
+        "no_euler_damping": int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP),
     }
-    values |= {name: x.ctypes.data for name, x in arrays.items()}
-    values |= where.arrays | where.counts | functions()
-    values |= {f"contact_{name}": x for name, x in where.contacts._asdict().items()}
-    values |= _print_numbers(parts, bed.prints) if bed.prints else {}
-    numbers = np.array([values.get(name, 0) for name in NAMES], np.int64)
-    return Layout(numbers, arrays)
+
+
+def _data_places() -> dict[str, int]:
+    """Return the places of arrays, counts and contacts in an mjData."""
+    where = places()
+    contacts = where.contacts._asdict()
+    numbers = {"time": where.time, **where.arrays, **where.counts}
+    return numbers | {f"contact_{name}": place for name, place in contacts.items()}
+
+
+def _function_addresses(bed: Bed) -> dict[str, int]:
+    """Return the addresses of the functions that a step calls: compiled code for the
+    bed's laws, reports in Python and MuJoCo's own."""
+    from rft.mujoco.compiled_parts import element_code
+    from rft.mujoco.compiled_solver import solver_code
+
+    return functions() | {
+        "element_code": element_code(_law_record_class(bed)).address,
+        "solver_code": solver_code().address,
+        "report": ctypes.cast(_report_unsolved, ctypes.c_void_p).value,
+        "report_changed": ctypes.cast(_report_changed, ctypes.c_void_p).value,
+    }
 
 
 def _print_numbers(parts: ModelParts, prints: Prints) -> dict[str, int]:
@@ -431,18 +501,19 @@ def _print_numbers(parts: ModelParts, prints: Prints) -> dict[str, int]:
     rows, columns = prints.shape
     return {
         "recorder": recorder().address,
-        "memory_start": parts.sizes["nuserdata"] - prints.numbers,
+        "memory_start": parts.sizes["nuserdata"] - prints.userdata_size,
         "print_rows": rows,
         "print_columns": columns,
     }
 
 
-def _form(bed: Bed) -> type:
+def _law_record_class(bed: Bed) -> type:
     """Return the class of the records of a bed's laws."""
     return type(record(bed.laws[0]))
 
 
-def _laws(bed: Bed) -> np.ndarray:
+def _law_numbers(bed: Bed) -> np.ndarray:
     """Return the numbers of a bed's laws, and the sine of the grazing angle of each in
     the last column."""
-    return np.array([[*record(law), law.grazing_sine] for law in bed.laws], float)
+    rows = [[*record(law), law.grazing_sine] for law in bed.laws]
+    return np.array(rows, float)

@@ -16,7 +16,7 @@ OWN = (
     "table", "row_spheres", "first", "geoms", "spheres", "dofs", "first_dof", "bodies",
     "parents", "trees",
     "laws", "ground", "disturbed", "surface", "hills", "hill_frame", "planes", "first_plane",
-    "derivative_rows", "derivative_columns", "form", "counts", "largest", "watch", "watched", "unsolved",
+    "derivative_rows", "derivative_columns", "shapes", "counts", "largest", "watch", "watched", "unsolved",
 )  # fmt: skip
 MODEL = (
     "model", "timestep", "integrator", "disableflags", "damping", "geom_size", "geom_type",

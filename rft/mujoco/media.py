@@ -1,4 +1,5 @@
-"""Media for sand in MuJoCo: by name, drawn within their uncertainty, and one for each simulation of a batch."""
+"""Media for sand in MuJoCo: by name, drawn within their uncertainty, and one for each
+simulation of a batch."""
 
 from __future__ import annotations
 
@@ -22,35 +23,40 @@ from rft.terradynamics.meshes.law import Spatial
 from rft.terradynamics.plates import VERTICAL, PlateStress, StressMap
 from rft.terradynamics.plates.stress import COEFFICIENTS
 
-MOST_DRAWS = (
-    100  # times n; draws that do not bear a plate pushed straight down are drawn again
-)
+# Times n: draws of maps, of which those that do not bear a plate pushed straight down
+# are drawn again.
+MAX_DRAWS = 100
 
 
 def law_of(medium: object) -> Extruded | Spatial:
-    """Return the law of three dimensions of a medium; Refusal for one without a vertical law."""
+    """Return the law of three dimensions of a medium; Refusal for one without a vertical
+    law."""
     if isinstance(medium, str):
-        if medium in CATALOGUE and medium not in VERTICAL:
-            raise Refusal(
-                f"{medium} has no vertical law",
-                instead=f"take one of {', '.join(VERTICAL)}",
-            )
-        near = difflib.get_close_matches(medium, VERTICAL, 1, 0.5)
-        cure = (
-            f"did you mean {near[0]}?" if near else f"take one of {', '.join(VERTICAL)}"
-        )
-        require(
-            medium in VERTICAL, f"there is no medium {formatted(medium)}", instead=cure
-        )
+        _require_vertical(medium)
         return Extruded(VERTICAL[medium].stress)
     if isinstance(medium, Spatial | Extruded):
         return medium
     if isinstance(medium, PlateStress):
         return Extruded(medium)  # refuses all but nine coefficients
-    cure = "give a name of rft.terradynamics.plates.VERTICAL, a StressMap or a Spatial"
     raise Refusal(
-        "the medium has no vertical law in three dimensions", value=medium, instead=cure
+        "the medium has no vertical law in three dimensions",
+        value=medium,
+        instead="give a name of rft.terradynamics.plates.VERTICAL, a StressMap or a"
+        " Spatial",
     )
+
+
+def _require_vertical(name: str) -> None:
+    """Raise Refusal for a name that is not in `VERTICAL`."""
+    if name in VERTICAL:
+        return
+    choices = f"take one of {', '.join(VERTICAL)}"
+    if name in CATALOGUE:
+        raise Refusal(f"{name} has no vertical law", instead=choices)
+    near = difflib.get_close_matches(name, VERTICAL, 1, 0.5)
+    if near:
+        choices = f"did you mean {near[0]}?"
+    raise Refusal(f"there is no medium {formatted(name)}", instead=choices)
 
 
 def sample(
@@ -61,58 +67,58 @@ def sample(
 ) -> list[StressMap | Spatial]:
     """Return n media within the uncertainty of one, the same for the same seed.
 
-    medium: a fit of `rft.fits.plates`, whose coefficients are drawn from its covariance, or whose strength from its
-    error; or any other medium, the logarithm of whose strength then has the standard deviation ``spread``. A drawn map that
-    does not bear a plate pushed straight down is drawn again."""
+    medium: a fit of `rft.fits.plates`, whose coefficients are drawn from its
+    covariance, or whose strength from its error; or any other medium, the logarithm of
+    whose strength then has the standard deviation ``spread``. A drawn map that does not
+    bear a plate pushed straight down is drawn again."""
     in_range("n", n, 1, 1_000_000, whole=True)
+    n = int(n)
     rng = np.random.default_rng(seed)
     if isinstance(medium, StressFit):
         require(
             spread is None, "a fit has its own covariance", instead="drop ``spread``"
         )
-        return _maps(
-            lambda count: rng.multivariate_normal(
-                medium.values, medium.covariance, count
-            ),
-            n,
-        )
+
+        def draw(count: int) -> np.ndarray:
+            return rng.multivariate_normal(medium.values, medium.covariance, count)
+
+        return _draw_maps(draw, n)
+
     if isinstance(medium, ZetaFit):
         require(spread is None, "a fit has its own error", instead="drop ``spread``")
-        medium, spread = StressMap(zeta=medium.zeta), medium.error / medium.zeta
-    medium = (
-        VERTICAL[medium].stress
-        if isinstance(medium, str) and medium in VERTICAL
-        else medium
-    )
+        spread = medium.error / medium.zeta
+        medium = StressMap(zeta=medium.zeta)
+    if isinstance(medium, str) and medium in VERTICAL:
+        medium = VERTICAL[medium].stress
     require(
         isinstance(medium, StressMap | Spatial),
         "the medium has no strength to draw",
         value=medium,
     )
-    cure = "give ``spread``, the standard deviation of the logarithm of its strength, or a fit with its covariance"
     require(
-        spread is not None, "the uncertainty of the medium is unknown", instead=cure
+        spread is not None,
+        "the uncertainty of the medium is unknown",
+        instead="give ``spread``, the standard deviation of the logarithm of its"
+        " strength, or a fit with its covariance",
     )
     in_range("spread", spread, 0, 2)
     strength = "zeta" if isinstance(medium, StressMap) else "xi_n"
-    factors = np.exp(spread * rng.standard_normal(int(n)))
-    return [
-        replace(medium, **{strength: getattr(medium, strength) * float(factor)})
-        for factor in factors
-    ]
+    value = getattr(medium, strength)
+    factors = np.exp(spread * rng.standard_normal(n))
+    return [replace(medium, **{strength: value * float(factor)}) for factor in factors]
 
 
-def _maps(draw: Callable[[int], np.ndarray], n: int) -> list[StressMap]:
-    """Return n maps of drawn coefficients (count, 9) that bear a plate pushed straight down."""
+def _draw_maps(draw: Callable[[int], np.ndarray], n: int) -> list[StressMap]:
+    """Return n maps that bear a plate pushed straight down. draw: function of a count,
+    returns coefficients (count, 9)."""
     maps: list[StressMap] = []
-    for _ in range(MOST_DRAWS):
-        drawn = [
-            StressMap(**dict(zip(COEFFICIENTS, map(float, row))))
-            for row in draw(int(n))
-        ]
-        maps += [one for one in drawn if one.alpha((0.0, -1.0), (0.0, -1.0))[1] > 0.0]
+    for _ in range(MAX_DRAWS):
+        for row in draw(n).tolist():
+            drawn = StressMap(**dict(zip(COEFFICIENTS, row)))
+            if drawn.alpha((0.0, -1.0), (0.0, -1.0))[1] > 0.0:
+                maps.append(drawn)
         if len(maps) >= n:
-            return maps[: int(n)]
+            return maps[:n]
     raise Refusal(
         "hardly any drawn map bears a plate",
         because="the covariance is larger than the coefficients",
@@ -120,21 +126,20 @@ def _maps(draw: Callable[[int], np.ndarray], n: int) -> list[StressMap]:
 
 
 class Media(Sequence):
-    """Media of the simulations of a batch, one each; ``media[i] = medium`` changes one between steps.
+    """Media of the simulations of a batch, one each; ``media[i] = medium`` changes one
+    between steps.
 
-    Where the ground has regions, each is a tuple of the medium and those of the regions, in order; a single medium that is
-    set is the one beyond the regions. models: those of the simulations, copies of one model, with a bed of sand each."""
+    Where the ground has regions, each is a tuple of the medium and those of the
+    regions, in order; a single medium that is set is the one beyond the regions.
+    models: those of the simulations, copies of one model, with a bed of sand each."""
 
     def __init__(self, model: mujoco.MjModel, bed: Bed, media: Sequence[Any]):
-        beds = [with_medium(bed, medium) for medium in media]
-        kinds = {type(one.laws[0]) for one in beds}
-        require(
-            len(kinds) == 1,
-            "media of one batch must have one form",
-            instead="give stress maps, or laws, alone",
-        )
-        self._beds, self.models = beds, [copy.copy(model) for _ in beds]
-        self._rows = [installed.install(*pair) for pair in zip(self.models, self._beds)]
+        self._beds = [with_medium(bed, medium) for medium in media]
+        require_one_form(tuple(one.laws[0] for one in self._beds), "of one batch")
+        self.models = [copy.copy(model) for _ in media]
+        self._rows = [
+            installed.install(own, bed) for own, bed in zip(self.models, self._beds)
+        ]
 
     def __len__(self) -> int:
         return len(self.models)
@@ -142,10 +147,10 @@ class Media(Sequence):
     def __getitem__(self, i: Any) -> Any:
         if isinstance(i, slice):
             return [self[k] for k in range(*i.indices(len(self)))]
-        *regions, medium = (
-            law.stress if isinstance(law, Extruded) else law
-            for law in self._beds[i].laws
-        )
+        laws = self._beds[i].laws
+        *regions, medium = [
+            law.stress if isinstance(law, Extruded) else law for law in laws
+        ]
         return (medium, *regions) if regions else medium
 
     def __iter__(self) -> Iterator[Any]:
@@ -157,12 +162,13 @@ class Media(Sequence):
             f"there is no simulation {formatted(i)}",
         )
         bed = with_medium(self._beds[i], medium)
-        same = type(bed.laws[0]) is type(self._beds[i].laws[0])
         require(
-            same, "media of one batch must have one form", instead="make another batch"
+            type(bed.laws[0]) is type(self._beds[i].laws[0]),
+            "media of one batch must have one form",
+            instead="make another batch",
         )
         self._beds[i] = bed
-        installed.change(self._rows[i], bed)
+        installed.replace_bed(self._rows[i], bed)
 
     def detach(self) -> None:
         """Take the beds away."""
@@ -171,24 +177,30 @@ class Media(Sequence):
 
 
 def with_medium(bed: Bed, medium: Any) -> Bed:
-    """Return a bed of another medium, or of a list of the medium and those of all regions."""
-    if not isinstance(medium, tuple | list):
-        return replace(bed, laws=one_form((*bed.laws[:-1], law_of(medium))))
-    count = len(bed.laws)
-    require(
-        len(medium) == count,
-        f"media of a simulation must be {count}, the medium and one for each region",
-    )
-    base, *regions = map(law_of, medium)
-    return replace(bed, laws=one_form((*regions, base)))
+    """Return a bed of another medium, or of a list of the medium and those of all
+    regions."""
+    if isinstance(medium, tuple | list):
+        count = len(bed.laws)
+        require(
+            len(medium) == count,
+            f"media of a simulation must be {count}, the medium and one for each region",
+        )
+        base, *regions = map(law_of, medium)
+    else:
+        base = law_of(medium)
+        regions = bed.laws[:-1]
+    laws = (*regions, base)
+    require_one_form(laws)
+    return replace(bed, laws=laws)
 
 
-def one_form(laws: tuple[Extruded | Spatial, ...]) -> tuple[Extruded | Spatial, ...]:
-    """Return the laws; Refusal unless all are stress maps or all laws of three dimensions."""
-    alike = len({type(law) for law in laws}) == 1
+def require_one_form(
+    laws: tuple[Extruded | Spatial, ...], owner: str = "of all regions"
+) -> None:
+    """Raise Refusal unless all laws are stress maps or all are laws of three
+    dimensions."""
     require(
-        alike,
-        "media of all regions must have one form",
+        len({type(law) for law in laws}) == 1,
+        f"media {owner} must have one form",
         instead="give stress maps, or laws, alone",
     )
-    return laws

@@ -57,7 +57,7 @@ class ModelParts(NamedTuple):
             _address(model.geom_dataid),
         )
 
-    def form(self, geoms: np.ndarray) -> np.ndarray:
+    def shape_numbers(self, geoms: np.ndarray) -> np.ndarray:
         """Return the numbers that the elements of geoms follow from, as they are now, (G, 5)."""
         count = self.sizes["ngeom"]
         sizes = (ctypes.c_double * (3 * count)).from_address(self.geom_size)

@@ -35,10 +35,12 @@ def add_forces(bed: Bed, parts: ModelParts, data: int):
     arrays = Arrays(data, parts.sizes)
     frames = bed.frames(arrays)
     velocity = arrays.qvel
-    distance = frames.height + (frames.up * bed.spheres[:, :3]).sum(1)
-    in_reach = distance < bed.spheres[:, 3]
+    distance = frames.height + (frames.up * bed.geoms.spheres[:, :3]).sum(1)
+    in_reach = distance < bed.geoms.spheres[:, 3]
     if hasattr(mujoco.MjData, "body_awake"):
-        in_reach &= arrays.body_awake[bed.bodies] != 0  # what sleeps needs no force
+        in_reach &= (
+            arrays.body_awake[bed.geoms.bodies] != 0
+        )  # what sleeps needs no force
     if not in_reach.any() or not (np.abs(velocity) < FASTEST).all():
         return None
     height = np.where(in_reach, frames.height, np.inf)
@@ -67,7 +69,7 @@ def _inputs(bed, parts, data: int, arrays: Arrays, frames, in_ground) -> Inputs:
     inertia = _inertia(parts, data, arrays)
     effective = inertia.copy()
     is_damped = _add_implicit_terms(parts, data, arrays, integrator, effective, step)
-    moved = bed.moved_by
+    moved = bed.geoms.moved_by
     return Inputs(
         inertia,
         effective,
@@ -151,12 +153,12 @@ def _add_implicit_terms(parts, data, arrays, integrator, effective, step) -> boo
 
 def _jacobians(bed: Bed, arrays: Arrays, frames, in_ground) -> np.ndarray:
     """Return the Jacobians (G, 6, nv) of the geoms in the ground along their own axes."""
-    arm = frames.place - arrays.subtree_com[bed.roots]
+    arm = frames.place - arrays.subtree_com[bed.geoms.roots]
     spin, speed = arrays.cdof[None, :, :3], arrays.cdof[None, :, 3:]
     speed = speed + np.cross(spin, arm[:, None])
     spin = np.broadcast_to(spin, speed.shape)
     both = [np.einsum("gij,gvi->gjv", frames.turn, x) for x in (speed, spin)]
-    moves = bed.moved_by & in_ground[:, None]
+    moves = bed.geoms.moved_by & in_ground[:, None]
     return np.concatenate(both, 1) * moves[:, None]
 
 

@@ -262,7 +262,7 @@ def bed_under(
     geom_faces = [
         _faces_of_geom(model, geom, own) for geom, own in surfaces_of_geoms.items()
     ]
-    return Bed.under_faces(
+    return Bed.from_faces(
         model,
         [*surfaces_of_geoms],
         geom_faces,
