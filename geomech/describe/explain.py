@@ -69,7 +69,7 @@ def system_lines(scene: Scene) -> list[str]:
 
 def cost_lines(scene: Scene) -> Iterator[str]:
     """Yield what a symmetry spares, and what errors from fewer elements cost."""
-    from geomech.studies.elements import coarser, elements_of
+    from geomech.studies.elements import coarser_systems, n_elements
     from geomech.tiers.base import solved_phases
 
     system, phases = scene.system, scene.numerics.phases
@@ -79,13 +79,13 @@ def cost_lines(scene: Scene) -> Iterator[str]:
             f"by symmetry: {solved} of {phases} phases of the gait are solved, the "
             "others are images of these"
         )
-    elements = elements_of(system)
+    elements = n_elements(system)
     fewer: list = []
     if elements:
-        fewer = coarser(system)
+        fewer = coarser_systems(system)
     if fewer:
         share = sum(1 / other.ratio for other in fewer) / 4
-        numbers = " and ".join(f"{elements_of(other.system)}" for other in fewer)
+        numbers = " and ".join(f"{n_elements(other.system)}" for other in fewer)
         yield (
             f"errors: contain the change from {elements} to {numbers} elements, at a "
             f"quarter of the phases: {share:.0%} of the cost of the displacement"
@@ -94,10 +94,10 @@ def cost_lines(scene: Scene) -> Iterator[str]:
 
 def tiers_line(system: System) -> str:
     """Return the tiers of a system, and those that are computed by name alone."""
-    from geomech.studies.available import tiers
+    from geomech.studies.available import available_tiers
     from geomech.tiers import TIERS
 
-    words = f"tiers: {', '.join(tiers(system))}"
+    words = f"tiers: {', '.join(available_tiers(system))}"
     by_name = []
     for name, tier in TIERS.items():
         if tier.is_possible(system) and not tier.is_offered(system):

@@ -25,7 +25,7 @@ from geomech.geometry.gait import LARGEST
 from geomech.io.files import atomic_file
 from geomech.scenes.key import keys_of
 from geomech.scenes.write import text_of, without_gait
-from geomech.studies.charts import SHARES, Chart, series_of
+from geomech.studies.charts import RESIDUAL_SHARES, Chart, fourier_series
 from geomech.systems.base import body_size, length_unit, shape_labels
 from rft.core.refusal import Refusal
 
@@ -136,7 +136,7 @@ def data(charts: list[Chart]) -> dict[str, Any]:
     return {
         "version": VERSION,
         "colours": colours,
-        "shares": SHARES,
+        "shares": RESIDUAL_SHARES,
         "gaits": _declared(),
         "largest": LARGEST,
         "scenes": scenes,
@@ -197,7 +197,7 @@ def _gait(gait: Gait) -> dict[str, Any]:
     }  # fmt: skip
     if isinstance(gait, Points):
         return {**shared, "points": [list(p) for p in gait.points]}
-    mean, cos, sin = series_of(gait)
+    mean, cos, sin = fourier_series(gait)
     shared["centre"] = (gait.middle + gait.amplitude * mean).tolist()
     return {**shared, "cos": cos.tolist(), "sin": sin.tolist()}
 

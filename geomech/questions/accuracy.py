@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from geomech.core.variables import Result
     from geomech.run.cost import Cost
     from geomech.scenes import Intruding, Scene, WalkerScene
-    from geomech.studies.accuracy import Adjustable
+    from geomech.studies.accuracy import AccuracySubject
 
 SHOWN = (
     "best_setting",
@@ -44,10 +44,10 @@ class Accuracy(Question):
     parallel: ClassVar[bool] = True
 
     @cached_property
-    def adjustable(self) -> "Adjustable":
+    def adjustable(self) -> "AccuracySubject":
         from geomech.studies import accuracy
 
-        return accuracy.adjustable(self.scene, self.runs)
+        return accuracy.accuracy_subject(self.scene, self.runs)
 
     def check(self) -> None:
         from rft.core.checks import in_range

@@ -169,7 +169,7 @@ def has_matrix(system: System) -> bool:
     return (
         isinstance(own, Metric)
         if own
-        else not effort.why_none(system) and effort.is_quadratic(system)
+        else not effort.why_no_metric(system) and effort.is_quadratic(system)
     )
 
 
@@ -201,7 +201,7 @@ def attributes(study: SceneTables) -> dict:
         **(
             {}
             if (degree := scene.system.traits.power_degree) is None
-            or effort.why_none(scene.system)
+            or effort.why_no_metric(scene.system)
             else {"power_degree": degree}
         ),
     }
@@ -228,7 +228,7 @@ def variables(study: SceneTables) -> list[Variable]:
         variables += of_pairs(study.two_form, two_form.error(study.fitted))
     if isinstance(study.scene.system, Framed):
         variables.append(of_frame(study.scene.system.field.field))
-    if not effort.why_none(study.scene.system):
+    if not effort.why_no_metric(study.scene.system):
         variables += of_metric(
             study.metric, capability(study.scene.system, OwnMetric) is None
         )  # before the harmonics, as they may share velocities
@@ -423,7 +423,7 @@ def of_metric(metric: Metric | Finsler, power: bool = True) -> list[Variable]:
                     "metric",
                     ("joint", "other_joint", *angles),
                     metric.M,
-                    effort.METRIC,
+                    effort.METRIC_UNIT,
                     own,
                 )
             ]

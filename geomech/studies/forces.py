@@ -16,8 +16,8 @@ from geomech.core.variables import Result, Variable
 from geomech.geometry.reconstruct import poses
 from geomech.run.cost import Cost
 from geomech.scenes.model import Scene
-from geomech.studies.cost import direct, price
-from geomech.studies.elements import coarser, elements_of, gait_with
+from geomech.studies.cost import direct_jobs, total_cost
+from geomech.studies.elements import coarser_systems, gait_with_elements, n_elements
 from geomech.studies.newtons import Newtons, Sizes, newtons
 from geomech.studies.undulation import activation_of, bends, loaded
 from geomech.systems.base import body_size, length_unit
@@ -47,8 +47,8 @@ def cost(scene: Scene) -> Cost:
     jobs = []
     for one in (scene, *_variants(scene)):
         phases = one.numerics.phases
-        jobs += direct(_divided(one), one.gait, 1, phases, checked=False)
-    return price(jobs)
+        jobs += direct_jobs(_divided(one), one.gait, 1, phases, checked=False)
+    return total_cost(jobs)
 
 
 def answer(scene: Scene, sizes: Sizes) -> Result:
@@ -226,10 +226,10 @@ def _variants(scene: Scene) -> list[Scene]:
 def _with_fewer_elements(scene: Scene) -> list[Scene]:
     """Return the scene of about half as many elements, of a continuous body and its gait, where it allows it."""
     system = scene.system
-    other = next(iter(coarser(system)), None)
+    other = next(iter(coarser_systems(system)), None)
     if other is None or other.ratio < 1:
         return []
-    gait = gait_with(scene.gait, system, elements_of(other.system))
+    gait = gait_with_elements(scene.gait, system, n_elements(other.system))
     return [scene.changed(system=other.system, gait=gait)]
 
 

@@ -44,13 +44,15 @@ class GrainSteps(Cost):
         seconds = duration(self.seconds)
         return f"{self.balances:.1e} steps of grains, about {seconds} of computing"
 
-    def check(self, place: str, yes: bool, less: str = "ask for less") -> None:
+    def check(
+        self, place: str, yes: bool, cheaper_alternative: str = "ask for less"
+    ) -> None:
         if not yes and self.seconds > LONGEST:
             raise TooLong(
                 str(self),
                 where=place,
                 instead=f"to compute for more than {duration(LONGEST)} say ``yes``, "
-                f"or {less}",
+                f"or {cheaper_alternative}",
             )
 
 

@@ -14,9 +14,9 @@ from geomech.geometry.symmetry import zero_components
 from geomech.run.cost import Cost
 from geomech.scenes.model import Scene
 from geomech.studies import fields
-from geomech.studies.cost import connection, cycles_of, direct, price
+from geomech.studies.cost import connection_jobs, direct_jobs, n_cycles, total_cost
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.tables import COMPONENTS, POSE, zero_words
+from geomech.studies.tables import COMPONENTS, POSE, zero_reason
 from geomech.systems.base import body_size, length_unit, shape_labels
 from geomech.systems.capabilities import (
     Drawable,
@@ -140,7 +140,7 @@ def final_pose(moved: Motion) -> list[Variable]:
     for name, value, of in zip(POSE, moved.pose[-1], (unit, unit, "rad")):
         zero = ""
         if name in why:
-            zero = zero_words(why[name])
+            zero = zero_reason(why[name])
         label = "after the last cycle"
         found.append(Variable(f"final_{name}", (), value, of, label, zero=zero))
     return found
@@ -208,7 +208,7 @@ def cost(scene: Scene, cycles: int = 1, mapped: bool = False) -> Cost:
     """Return the cost of `answer` and a table of it."""
     parts = [cost_of_table(scene, cycles)]
     if mapped and is_mapped(scene):
-        parts.append(price(connection(scene)))
+        parts.append(total_cost(connection_jobs(scene)))
     return summed(parts)
 
 
@@ -222,18 +222,18 @@ def cost_of_table(scene: Scene, cycles: int) -> Cost:
     """Return the cost of `motion` and a table of it."""
     checked(cycles)
     system, phases = scene.system, scene.numerics.phases
-    jobs = direct(scene, scene.gait, 1, phases, checked=False)
+    jobs = direct_jobs(scene, scene.gait, 1, phases, checked=False)
     if system.traits.steps and not settling(system):
         # Each continues the one before; cycles up to the limit cycle are run first.
-        first_cycles = cycles_of(system)
+        first_cycles = n_cycles(system)
         if system.traits.lacks & Premise.SE2_SYMMETRIC:
             first_cycles = 0
-        times = (first_cycles + cycles_of(system) - 1 + cycles) / cycles_of(system)
+        times = (first_cycles + n_cycles(system) - 1 + cycles) / n_cycles(system)
         jobs = [
             job._replace(count=job.count * times, batches=job.batches * times)
             for job in jobs
         ]
-    total, rows = price(jobs), cycles * phases + 1
+    total, rows = total_cost(jobs), cycles * phases + 1
     width = 2 * (balance_size(system).elements + 1) + system.joints + 5
     memory = 8 * HELD * rows * (system.joints + 5 + width)
     words = WORDS * rows * width

@@ -28,7 +28,7 @@ from geomech.run.progress import progress as shown
 from geomech.scenes.frames import framed
 from geomech.scenes.model import Scene, frequency_of
 from geomech.studies import cost, effort, estimate, tables, uncertainty
-from geomech.studies.available import default_tiers, tiers
+from geomech.studies.available import available_tiers, default_tiers
 from geomech.systems.base import body_size, refuse_singular, shape_labels
 from geomech.systems.capabilities import gaits_per_batch, stored_table
 from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
@@ -87,7 +87,7 @@ class SceneTables:
         study.scene = scene
         return study
 
-    tiers = property(lambda self: tiers(self.scene.system))
+    tiers = property(lambda self: available_tiers(self.scene.system))
 
     def _stored(self, name: str, key: tuple, build: Callable):
         """Return the value of build(), the seconds that it took, and whether it was stored before."""
@@ -208,12 +208,12 @@ class SceneTables:
         system, n = self.scene.system, self.scene.numerics
         shared = harmonic.table(system, n)
         if (
-            not effort.shared(system)
+            not effort.shares_velocities(system)
             or (shared.name, system, shared.key) in self._tables
         ):
-            return effort.table(system, n, progress)
+            return effort.fit_metric(system, n, progress)
         (harmonics, norm), took = timed(
-            lambda: effort.with_harmonics(system, n, progress)
+            lambda: effort.fit_with_harmonics(system, n, progress)
         )
         self._tables[shared.name, system, shared.key] = harmonics, took
         return norm
@@ -302,7 +302,7 @@ class SceneTables:
         gait: Gait | None = None,
         progress: Callable | None = None,
     ) -> Result:
-        """Return the net poses (`geomech.studies.tables.result`) by tiers of TIERS
+        """Return the net poses (`geomech.studies.tables.displacement_result`) by tiers of TIERS
         (`default_tiers` if None), with their errors (`geomech.studies.estimate`).
 
         seconds, by part: time to build each table ("field", "harmonic table" ...), even
@@ -312,7 +312,7 @@ class SceneTables:
         seconds are not part of this call."""
         gait, values, chosen = self._checked(gait, amplitudes, tiers)
         medium, took = timed(
-            lambda: uncertainty.of_medium(self.scene, gait, values)
+            lambda: uncertainty.medium_spread(self.scene, gait, values)
         )  # first, as it may refuse
         seconds, stored = self._build_all(chosen, progress)
         if medium:
@@ -333,7 +333,7 @@ class SceneTables:
                 poses[tier], seconds[tier] = timed(
                     lambda m=tier: self.poses(m, gait, values)
                 )
-                check = lambda m=tier: estimate.against_direct(
+                check = lambda m=tier: estimate.errors_from_direct(
                     self.scene, poses[m], gait, values, reference
                 )
                 errors[tier], took = timed(check)
@@ -345,8 +345,8 @@ class SceneTables:
                 if reference is None:
                     seconds["errors"] = seconds.get("errors", 0.0) + took
         poses, errors = ({m: x[m] for m in chosen} for x in (poses, errors))
-        more = tables.timings(seconds, stored)
-        return tables.result(
+        more = tables.timing_variables(seconds, stored)
+        return tables.displacement_result(
             self.scene, gait, values, poses, errors, medium, spreads, more
         )
 
@@ -379,8 +379,8 @@ class SceneTables:
         `geomech.studies.cost`."""
         gait, amplitudes, plans = self._checked(gait, amplitudes, tiers, *SAMPLES)
         with located(self.scene.name):
-            return cost.price(
-                [*cost.study(self.scene, plans, len(amplitudes), gait), *more]
+            return cost.total_cost(
+                [*cost.study_jobs(self.scene, plans, len(amplitudes), gait), *more]
             )
 
     def _checked(

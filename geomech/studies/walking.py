@@ -21,7 +21,7 @@ from geomech.run.runner import runner
 from geomech.scenes import write as written
 from geomech.scenes.walker import WalkerScene
 from geomech.studies.grid import Grid
-from geomech.studies.settings import Measured
+from geomech.studies.settings import Measurements
 from rft.core.metres import GRAVITY
 from rft.core.refusal import Refusal, located
 from rft.terradynamics.walking import Mjcf, Rhex, Roller, Walk, engine
@@ -303,12 +303,12 @@ class Walks:
         grid = Grid(scene, over, written.tables(scene))
         last = grid.total - 1
         for k in {*range(0, grid.total, max(1, grid.total // 200)), last}:
-            scene_ = grid.at(grid.points[k])
+            scene_ = grid.scene_factory(grid.points[k])
             if k in (0, last):
                 refuse_engine(scene_)
         return grid
 
-    def together(self, scene: WalkerScene) -> int:
+    def batch_size(self, scene: WalkerScene) -> int:
         # Other engines walk one robot after the other, which also shows progress.
         return TOGETHER if scene.engine == "planar" else 1
 
@@ -326,7 +326,7 @@ class Walks:
         )
 
     def cost(self, grid: Grid) -> Steps:
-        ends = (grid.at(grid.points[k]) for k in (0, grid.total - 1))
+        ends = (grid.scene_factory(grid.points[k]) for k in (0, grid.total - 1))
         return max(
             (price(s, grid.total, settling=True) for s in ends), key=lambda c: c.seconds
         )
@@ -373,7 +373,7 @@ class Settings:
         balances, steps = (round(x * shares / 2) for x in (one.balances, one.steps))
         return Steps(balances, seconds, BASE, seconds, steps)
 
-    def prepared(self) -> Settings:
+    def with_shared_data(self) -> Settings:
         (walk,) = engine(self.scene.engine).walk(
             [self.scene.walker], self.scene.numerics, SETTLING
         )
@@ -386,7 +386,7 @@ class Settings:
             for one in SETTINGS
         ]
 
-    def numbers(self, setting: Setting, value: Any) -> list[np.ndarray]:
+    def evaluate(self, setting: Setting, value: Any) -> list[np.ndarray]:
         """Return the speed with one setting at another value."""
         value = FINEST[setting.name] if value is None else value
         numerics = dataclasses.replace(self.scene.numerics, **{setting.name: value})
@@ -400,7 +400,7 @@ class Settings:
     ) -> dict[str, float]:
         return {"error": float(abs(numbers[0] - truth[0]))}
 
-    def choices(self, measured: Measured) -> list[Variable]:
+    def choices(self, measured: Measurements) -> list[Variable]:
         """Return for tolerances the coarsest value of each setting from which on the
         error is within, nan if there is none, and the speed."""
         coarsest = np.full((len(measured.settings), len(TOLERANCES)), np.nan)
