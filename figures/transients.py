@@ -16,7 +16,7 @@ from figures import main, style
 from geomech import plots
 from geomech.gaits import Sine
 from geomech.scenes import load
-from geomech.studies.batch import side_by_side
+from geomech.studies.batch import joined_scene
 from rft import Backbone, Transient
 
 AMPLITUDES = (0.1, 0.22, 0.4)  # A / lambda
@@ -51,7 +51,7 @@ def compute(shares=SHARES, elements: int = 40, phases: int = 64) -> dict:
         for a in AMPLITUDES
         for share in shares
     ]
-    run = side_by_side(scenes).cycle(phases=phases)
+    run = joined_scene(scenes).cycle(phases=phases)
     net = np.hypot(run.net[:, 0], run.net[:, 1]).reshape(len(AMPLITUDES), -1)
     xi = run.xi.reshape(len(AMPLITUDES), len(shares), phases, 3)
     return {

@@ -137,8 +137,8 @@ def allow(question: Question, cost: Cost, yes: bool) -> None:
     name = question.subject_name
 
     def judge(cost: Cost) -> None:
-        cost.check(name, yes, question.less)
-        if not cost.small or cost.seconds >= question.worth_saying:
+        cost.check(name, yes, question.cheaper_alternative)
+        if not cost.small or cost.seconds >= question.report_above:
             terminal.report(f"{name}: {cost}")
 
     prefer_for(cost.as_balances)

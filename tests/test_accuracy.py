@@ -12,7 +12,7 @@ from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection
 from geomech.studies import tiered
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.settings import Measured, cheapest, padded
+from geomech.studies.settings import Measurements, choice_variables, padded_array
 from geomech.tiers.direct import direct
 from rft import Chain, Viscous, body_velocity
 
@@ -178,9 +178,9 @@ def test_the_best_setting_is_the_quickest_that_is_good_enough():
         Setting("curves", (6, 12), 4, tier="adapted"): ((4e-3, 8e-4), (3.0, 2.5)),
         Setting("segments", (4,), 2, against="limit"): ((1e-9,), (0.1,)),
     }
-    errors, seconds = (padded(rows) for rows in zip(*runs.values()))
-    values = padded([setting.values for setting in runs])
-    measured = Measured([*runs], values, seconds, {"error": errors})
+    errors, seconds = (padded_array(rows) for rows in zip(*runs.values()))
+    values = padded_array([setting.values for setting in runs])
+    measured = Measurements([*runs], values, seconds, {"error": errors})
     best = {
         0.1: ("direct: phases", 16, 1.0),
         3e-2: ("direct: phases", 16, 1.0),
@@ -194,7 +194,7 @@ def test_the_best_setting_is_the_quickest_that_is_good_enough():
     def choose(tolerance):
         return tiered.quickest(measured, errors, tolerance)
 
-    found = cheapest(measured, errors, "BL", tolerances, choose)
+    found = choice_variables(measured, errors, "BL", tolerances, choose)
     by_name = {v.name: v.values for v in found}
     names, values, seconds = zip(*best.values())
     assert tuple(by_name["best_setting"]) == names

@@ -20,7 +20,12 @@ from geomech.geometry import curvature
 from geomech.io import files
 from geomech.questions import run
 from geomech.results.files import load
-from geomech.studies.report import compared, reachable, steps, tables_of
+from geomech.studies.report import (
+    compared_gaits,
+    gait_tables,
+    reachable_amplitudes,
+    round_amplitudes,
+)
 from geomech.studies.scene_tables import SceneTables
 from rft.core.refusal import Refusal
 
@@ -192,7 +197,7 @@ def test_run_leaves_everything(undrawn, tmp_path):
     said = " ".join(out.split())
     assert "s.toml, circle: displacement per cycle, direct tier" in said
     assert [p.name for p in (tmp_path / "deep").iterdir()] == ["dir"]
-    tables = tables_of(load(tmp_path / "deep" / "dir" / "displacement.json"))
+    tables = gait_tables(load(tmp_path / "deep" / "dir" / "displacement.json"))
     assert set(tables) == {"circle", "butterfly"}
     for gait, result in tables.items():
         table = tabled(result)
@@ -629,7 +634,9 @@ def test_commands_load_what_they_use_and_no_more(tmp_path):
     ],
 )
 def test_amplitudes_of_a_report_are_round_and_about_ten(top, step, count):
-    assert steps(top) == pytest.approx(step * np.arange(1, count + 1), rel=1e-9)
+    assert round_amplitudes(top) == pytest.approx(
+        step * np.arange(1, count + 1), rel=1e-9
+    )
 
 
 def test_amplitudes_of_a_report_fill_the_field():
@@ -639,10 +646,10 @@ def test_amplitudes_of_a_report_fill_the_field():
     for centre, amplitude, room in (((0.4, -0.8), 0.7, 1.2), ((0.8, -0.4), -0.7, 1.2)):
         gait = Circle(amplitude=amplitude, centre=centre, frequency=3.0)
         moved = scene.changed(gait=gait)
-        assert reachable(moved, gait) == pytest.approx(
-            np.sign(amplitude) * np.array(steps(room))
+        assert reachable_amplitudes(moved, gait) == pytest.approx(
+            np.sign(amplitude) * np.array(round_amplitudes(room))
         )
-        own, other = compared(moved)
+        own, other = compared_gaits(moved)
         assert own is gait and (type(other).__name__, other.frequency) == (
             "Butterfly",
             3.0,
@@ -651,12 +658,14 @@ def test_amplitudes_of_a_report_fill_the_field():
         Refusal,
         match="the gait's centre lies outside the field: raise \\[numerics\\] extent",
     ):
-        reachable(scene, Circle(centre=(0.0, 2.0)))
+        reachable_amplitudes(scene, Circle(centre=(0.0, 2.0)))
     snake = scenes.load(
         "no-slip-snake"
     )  # with singular shapes the gait's own is the last
     gait = Circle(amplitude=-0.33, centre=snake.gait.centre)
-    assert reachable(snake, gait) == pytest.approx([*(-np.array(steps(0.33))), -0.33])
+    assert reachable_amplitudes(snake, gait) == pytest.approx(
+        [*(-np.array(round_amplitudes(0.33))), -0.33]
+    )
     for still in (Circle(amplitude=0.0), Ellipse(semi_axes=(0.0, 0.0))):
         with pytest.raises(Refusal, match="does not move: give it a size"):
-            reachable(snake, still)
+            reachable_amplitudes(snake, still)

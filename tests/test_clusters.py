@@ -48,7 +48,7 @@ def address():
 
 
 def test_the_cluster_gives_the_same_digits(address, power, monkeypatch):  # noqa: F811
-    monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", 4)
+    monkeypatch.setattr(cycles, "BATCH_SIZE", 4)
     for scene, over in (
         (GLASS, OVER),
         (GLASS.changed(medium=power(1.0)), {"medium.power": [0.9, 1.0]}),

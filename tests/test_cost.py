@@ -136,7 +136,7 @@ def test_large_requests_are_refused_without_yes(name, large, monkeypatch):
     monkeypatch.setattr(
         connection, "SAMPLES_TOGETHER", 2000
     )  # three small batches tell
-    monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", 4)
+    monkeypatch.setattr(cycles, "BATCH_SIZE", 4)
     monkeypatch.setattr("geomech.systems.capabilities.VALUES_TOGETHER", 1 << 15)
     before = sorted(p.name for p in large.iterdir())
     code, out, err = run(*LARGE[name])
@@ -177,7 +177,7 @@ def test_yes_computes_and_says_what_is_to_come(large, monkeypatch):
 
 def test_a_field_of_four_joints_is_written(large, monkeypatch):
     """Said before it begins once it takes a second; least squares over the same directions at one of its shapes."""
-    monkeypatch.setattr("geomech.questions.connection.Connection.worth_saying", 0.0)
+    monkeypatch.setattr("geomech.questions.connection.Connection.report_above", 0.0)
     code, out, err = run(
         "connection", "five.toml", "--grid", "4", "--extent", "1.2", "-o", "out.nc"
     )
@@ -272,7 +272,7 @@ def test_a_sweep_over_amplitude_goes_in_groups(tmp_path, monkeypatch):
         "gait.amplitude": np.linspace(0.2, 1.5, 7).tolist(),
     }
     whole, kept = swept_table(sweep.sweep(VISCOUS, over)), tmp_path / ".s.partial"
-    monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", 3)
+    monkeypatch.setattr(cycles, "BATCH_SIZE", 3)
     rows, calls = cycles._rows, []
 
     def stopping(at, amplitudes):

@@ -105,7 +105,7 @@ def test_the_balances_foretold_are_those_solved(name, solved):
     "scene", [GLASS, SKIN, SLOPING.with_numerics(phases=32, cycles=2)]
 )
 def test_what_moving_costs_takes_the_balances_foretold(scene, solved):
-    foretold = cost.price(cost.of_effort(scene, 3)).balances
+    foretold = cost.total_cost(cost.effort_jobs(scene, 3)).balances
     effort.effort(scene, None, [0.1, 0.2, 0.3])
     assert foretold == sum(solved)
 
@@ -123,12 +123,12 @@ def test_a_motion_takes_the_balances_foretold(scene, cycles, solved):
 
 
 TABLES = {
-    "connection": (cost.connection, lambda study: study.fitted),
-    "harmonics": (cost.harmonics, lambda study: study.compute_harmonics()),
-    "metric": (cost.of_metric, lambda study: study.metric),
-    "even part": (cost.of_even_part, lambda study: study.even_part),
+    "connection": (cost.connection_jobs, lambda study: study.fitted),
+    "harmonics": (cost.harmonic_jobs, lambda study: study.compute_harmonics()),
+    "metric": (cost.metric_jobs, lambda study: study.metric),
+    "even part": (cost.even_part_jobs, lambda study: study.even_part),
     "plane": (
-        lambda s: cost.of_planes(s, [(0, 1)], [s.gait.middle]),
+        lambda s: cost.plane_jobs(s, [(0, 1)], [s.gait.middle]),
         lambda study: study.plane((0, 1)),
     ),
 }
@@ -142,11 +142,11 @@ def test_a_table_takes_the_balances_foretold(scene, grid, name, solved):
     study = SceneTables(scene)
     if name == "even part":
         study.compute_field()  # on whose grid it is
-    if name == "metric" and effort.why_none(scene.system):
+    if name == "metric" and effort.why_no_metric(scene.system):
         pytest.skip("it has none")
     solved.clear()
     compute(study)
-    assert sum(solved) == cost.price(jobs(scene)).balances
+    assert sum(solved) == cost.total_cost(jobs(scene)).balances
 
 
 def test_accuracy_and_sweep_say_what_they_cost(solved):
@@ -208,7 +208,7 @@ def test_all_of_a_scene_takes_as_much_as_foretold(solved):
 def test_memory_is_foretold_too_large_rather_than_too_small():
     """Of gaits that fill a batch, beside what is in memory anyway."""
     scene, amplitudes = GLASS.with_numerics(phases=4096), np.linspace(0.1, 1, 40)
-    told = cost.direct(scene, scene.gait, len(amplitudes), 4096)[0].memory - BASE
+    told = cost.direct_jobs(scene, scene.gait, len(amplitudes), 4096)[0].memory - BASE
     tracemalloc.start()
     try:
         tabled(SceneTables(scene).displacements(amplitudes, ["direct"]))

@@ -10,7 +10,7 @@ import pytest
 from geomech import scenes
 from geomech.optimisation import build_request
 from geomech.run.digest import Undigestible, digest
-from geomech.studies.effort import _Driven
+from geomech.studies.effort import _RecordedVelocity
 from geomech.studies.scene_tables import SceneTables
 from geomech.systems.solver import Solver
 
@@ -126,7 +126,7 @@ OTHER = [
         Solver(),
         Solver(backend="numpy"),
         VISCOUS.system.power,
-        _Driven(VISCOUS.system, []),
+        _RecordedVelocity(VISCOUS.system, []),
     ),
 ]
 
@@ -144,9 +144,9 @@ def test_other_contents_have_others():
 def test_what_an_object_remembers_is_no_part_of_it():
     body, fresh = Body(2.0), Body(2.0)
     assert body.area == 4.0 and digest(body) == digest(fresh)
-    driven = _Driven(VISCOUS.system, [])
+    driven = _RecordedVelocity(VISCOUS.system, [])
     driven.receive(A)
-    assert digest(driven) == digest(_Driven(VISCOUS.system, []))
+    assert digest(driven) == digest(_RecordedVelocity(VISCOUS.system, []))
     request = build_request(VISCOUS, "displacement")
     before = digest(request)
     assert request.degree == 2.0 and digest(request) == before

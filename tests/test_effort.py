@@ -251,8 +251,8 @@ def test_a_damaged_metric_is_refused(tmp_path):
 )
 def test_what_it_takes_is_foretold(medium, body):
     one, counts = scene(Swimmer(medium, body), Circle()), []
-    foretold = cost.price(cost.of_metric(one)).balances
-    assert effort.why_none(one.system) == ""  # which is asked for once
+    foretold = cost.total_cost(cost.metric_jobs(one)).balances
+    assert effort.why_no_metric(one.system) == ""  # which is asked for once
     with listening(lambda samples, points, linear: counts.append(samples)):
         SceneTables(one).metric  # noqa: B018
     assert sum(counts) == foretold
@@ -319,7 +319,7 @@ def test_a_metric_of_the_systems_own_has_lengths_and_no_work(name, capsys):
         )
     assert (
         ended.value.code == 0
-        and f"path length ({effort.METRIC})" in capsys.readouterr().out
+        and f"path length ({effort.METRIC_UNIT})" in capsys.readouterr().out
     )
     assert "metric" in to_xarray(fields.full_result(study))
 
@@ -329,9 +329,9 @@ def test_phases_of_a_cost_are_fours_and_its_errors_are_what_half_of_them_change(
         scene(Swimmer(FLUID, UNEVEN)),
         scene(Swimmer(SAND, UNEVEN, (Transient(travel_m=0.03),))),
     )
-    assert [effort.phases_of(fluid, n) for n in (8, 9, 12, 13)] == [8, 12, 12, 16]
-    assert [effort.phases_of(past, n) for n in (8, 32, 33)] == [32, 32, 36]
-    assert effort.phases_of(fluid) == -(-fluid.numerics.phases // 4) * 4
+    assert [effort.effort_phases(fluid, n) for n in (8, 9, 12, 13)] == [8, 12, 12, 16]
+    assert [effort.effort_phases(past, n) for n in (8, 32, 33)] == [32, 32, 36]
+    assert effort.effort_phases(fluid) == -(-fluid.numerics.phases // 4) * 4
     sand = scene(Swimmer(SAND, UNEVEN))
     fine, half = (effort.effort(sand, None, [0.4, 1.1], phases) for phases in (32, 16))
     for key in ("path_length", "work"):

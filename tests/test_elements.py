@@ -9,7 +9,7 @@ from geomech.optimisation.evaluate import evaluate_gait
 from geomech.optimisation.request import build_request
 from geomech.scenes.model import Scene
 from geomech.studies import estimate
-from geomech.studies.choose import cheapest
+from geomech.studies.choose import cheapest_displacements
 from geomech.studies.effort import effort
 from geomech.studies.scene_tables import SceneTables
 from geomech.systems import Swimmer
@@ -102,7 +102,7 @@ def test_errors_of_time_stepping_contain_it():
 
 def test_a_tolerance_refines_elements():
     swimmer = Scene(Swimmer(FLUID, Backbone(elements=20)), Sine(0.2, elements=20))
-    found = cheapest(swimmer, [0.2], 1e-3)
+    found = cheapest_displacements(swimmer, [0.2], 1e-3)
     fine = Scene(Swimmer(FLUID, Backbone(elements=FINE)), Sine(0.2, elements=FINE))
     (true,), _ = estimate.direct(fine, fine.gait, np.array([0.2]), 128)
     assert found["chosen_elements"].values in (40, 80)

@@ -86,7 +86,7 @@ def failing(monkeypatch, how):
     """Batches of body velocities that fail, all saying so, or one of them raising; of an interrupted `run` the second,
     when there is something in its folder."""
     solve, calls = rft.body_velocity, []
-    effort._even.cache_clear()  # it asks for velocities, too
+    effort._is_even.cache_clear()  # it asks for velocities, too
 
     def fails(*args, **kwargs):
         calls.append(1)

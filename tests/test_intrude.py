@@ -18,7 +18,7 @@ from geomech.scenes.intruder import IntruderScene
 from geomech.studies import intrusion
 from geomech.studies.intrusion import Settings, answer, estimate
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.settings import Measured
+from geomech.studies.settings import Measurements
 from rft.core.refusal import Refusal
 from rft.terradynamics.plates import (
     VERTICAL,
@@ -574,7 +574,7 @@ def test_a_tolerance_that_is_just_met_is_met(monkeypatch):
     """By the fewest elements, in force and moment."""
     monkeypatch.setattr(intrusion, "TOLERANCES", np.array([1e-2, 9.9e-3, 1e-3]))
     errors = {"force_error": [5e-3, 2e-3], "moment_error": [1e-2, 1e-3]}
-    measured = Measured(
+    measured = Measurements(
         [Setting("elements", (8, 16), 2)],
         np.array([[8.0, 16.0]]),
         np.array([[1.0, 2.0]]),

@@ -99,7 +99,7 @@ def test_errors_hold_and_are_not_idle(name):
 
 
 def test_harmonics_that_are_next_to_nothing_are_left_out(monkeypatch):
-    monkeypatch.setattr(charts, "SMALL", 0.05)
+    monkeypatch.setattr(charts, "SMALLEST_HARMONIC", 0.05)
     series = SceneTables(
         scenes.load("three-link-glass").with_numerics(grid=9)
     ).compute_harmonics()
@@ -115,7 +115,7 @@ def test_harmonics_that_are_next_to_nothing_are_left_out(monkeypatch):
 
 def test_a_gait_that_is_no_series_is_one_for_the_page():
     gait = Points(points=((1.0, 0.2), (0.3, 0.9), (-0.8, 0.1), (-0.2, -0.7)))
-    mean, cos, sin = charts.series_of(gait)
+    mean, cos, sin = charts.fourier_series(gait)
     t = np.linspace(0, 2 * np.pi, 50)
     kt = np.outer(t, np.arange(1, cos.shape[1] + 1))
     assert np.abs(mean).min() > 0.01
@@ -150,31 +150,34 @@ def test_a_family_has_the_scene_as_a_member(family):
         line,
     ]
     own = charts.tiers(charts.chart(chart.scene), OFF_CENTRE)
-    for tier, (net, _) in charts.tiers(chart.at(1.8), OFF_CENTRE).items():
+    for tier, (net, _) in charts.tiers(chart.member(1.8), OFF_CENTRE).items():
         np.testing.assert_allclose(net, own[tier].net, atol=1e-6)
 
 
 def test_between_members_the_error_says_how_far_off(family):
     (chart,) = family
-    other = Lab((chart.scene,), {"medium.C": [2.6]})._grid.at((2.6,))
+    other = Lab((chart.scene,), {"medium.C": [2.6]})._grid.scene_factory((2.6,))
     true, guess = (
         charts.tiers(charts.chart(other), OFF_CENTRE)["harmonic"],
-        charts.tiers(chart.at(2.6), OFF_CENTRE)["harmonic"],
+        charts.tiers(chart.member(2.6), OFF_CENTRE)["harmonic"],
     )
     off = np.hypot(*(true.net - guess.net)[:2])
     assert 1e-7 < off < chart.family.error < 1e-3
-    member = charts.tiers(chart.at(2.2), OFF_CENTRE)["harmonic"]
-    assert chart.at(2.6).between == chart.family.error and chart.at(2.2).between == 0.0
+    member = charts.tiers(chart.member(2.2), OFF_CENTRE)["harmonic"]
+    assert (
+        chart.member(2.6).between == chart.family.error
+        and chart.member(2.2).between == 0.0
+    )
     assert (
         guess.error[0] > chart.family.error > abs(guess.error[0] - member.error[0]) / 3
     )
     moved = (
-        charts.tiers(chart.at(3.0), OFF_CENTRE)["harmonic"].net
-        - charts.tiers(chart.at(1.0), OFF_CENTRE)["harmonic"].net
+        charts.tiers(chart.member(3.0), OFF_CENTRE)["harmonic"].net
+        - charts.tiers(chart.member(1.0), OFF_CENTRE)["harmonic"].net
     )
     assert np.hypot(*moved[:2]) > 20 * chart.family.error
     with pytest.raises(Refusal, match="one scene, and not of a family"):
-        chart.at(2.0).at(2.0)
+        chart.member(2.0).member(2.0)
 
 
 def test_one_file_without_network_markup_or_repetition(glass):
@@ -348,7 +351,7 @@ def test_the_page_computes_what_python_does(opened, page):
                 value,
             )
             expected = charts.tiers(
-                chart if value is None else chart.at(value), gait, frame
+                chart if value is None else chart.member(value), gait, frame
             )
             for tier, numbers in zip(("harmonic", "path", "area"), got):
                 worst = max(
@@ -486,7 +489,9 @@ def test_files_and_back(opened, page):
     assert "loop=butterfly" in (opened.folder / "map.svg").read_text(encoding="utf-8")
     rows = (opened.folder / "loop.csv").read_text().splitlines()
     harmonic = [float(x) for x in rows[2].split(",")[1:]]
-    expected = charts.tiers(page[1]["three-link-glass"].at(2.5), saved.gait)["harmonic"]
+    expected = charts.tiers(page[1]["three-link-glass"].member(2.5), saved.gait)[
+        "harmonic"
+    ]
     np.testing.assert_allclose(harmonic, [*expected.net, *expected.error], atol=1e-6)
     click(opened, "[data-loop='circle']")
     opened.find_element("id", "open").send_keys(str(opened.folder / "loop.toml"))
@@ -878,7 +883,9 @@ def test_what_a_series_leaves_is_summed_along_the_loop():
         axes=axes, residual=residual, grid_error=(1e-3, 2e-3), between=0.5
     )
     length, (a, b) = 2 * np.pi * 0.6, (0.4, 0.7)
-    found = charts.left_error(chart, *Circle(amplitude=0.6, centre=(a, b)).cycle(64))
+    found = charts.harmonic_error(
+        chart, *Circle(amplitude=0.6, centre=(a, b)).cycle(64)
+    )
     assert found == pytest.approx(
         (
             length * (0.35 * 0.05 * (1 + 0.2 * a - 0.1 * b) + 1e-3) + 0.5,

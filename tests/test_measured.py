@@ -51,7 +51,7 @@ from geomech.results.measured import scene_text
 from geomech.scenes import Scene, load
 from geomech.studies import fields
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.single import single
+from geomech.studies.single import diagnosed_velocity
 from geomech.systems import Swimmer, Table
 from geomech.systems.base import length_unit
 from geomech.systems.capabilities import stored_table, table_error
@@ -1013,9 +1013,9 @@ def test_a_tube_between_the_points_of_its_grid_is_looked_up_all_the_same(
     assert np.isnan(study.fitted.A).all()
     np.testing.assert_allclose(study.poses("direct"), thin.displacement[0], rtol=1e-9)
     assert (
-        single(study.scene.system, thin.taylor.loop.shape(np.array(1.0)), [1.0, 0.0])[
-            "residual"
-        ]
+        diagnosed_velocity(
+            study.scene.system, thin.taylor.loop.shape(np.array(1.0)), [1.0, 0.0]
+        )["residual"]
         is None
     )
 

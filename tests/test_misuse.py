@@ -21,9 +21,9 @@ from geomech.gaits import Circle, Ellipse, Sine
 from geomech.geometry import connection, curvature
 from geomech.geometry.stretch import stretch
 from geomech.scenes import Numerics, Scene
-from geomech.studies.choose import cheapest
+from geomech.studies.choose import cheapest_displacements
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.single import single as single_of
+from geomech.studies.single import diagnosed_velocity as single_of
 from geomech.systems import NoSlipSnake, Swimmer
 from rft import Backbone, Chain, Coulomb, EndCaps, Serpenoid, Viscous
 from rft.core.refusal import Refusal
@@ -200,7 +200,7 @@ def test_from_python_units_are_warned_of_by_name():
         lambda: Scene(NoSlipSnake(), Ellipse(centre=(7, 0))),
         lambda: SceneTables(VISCOUS).poses("direct", amplitudes=[1, -30]),
         lambda: tabled(SceneTables(VISCOUS).displacements([30], ["direct"])),
-        lambda: tabled(cheapest(VISCOUS, [30.0], 1.0)),
+        lambda: tabled(cheapest_displacements(VISCOUS, [30.0], 1.0)),
         lambda: single_of(VISCOUS.system, [30, 17], [1, 0]),
         lambda: single_of(NoSlipSnake(), [30, 17], [1, 0]),
     ):

@@ -13,7 +13,7 @@ from geomech.geometry import connection, curvature
 from geomech.geometry.coordinates import change_velocity
 from geomech.scenes import Scene
 from geomech.studies import fields, sweep
-from geomech.studies.available import tiers
+from geomech.studies.available import available_tiers
 from geomech.studies.scene_tables import SceneTables, refuse_outside
 from geomech.systems import Swimmer, Table
 from geomech.systems.base import shape_labels
@@ -135,7 +135,7 @@ def test_one_mode_and_many_modes():
     """A single mode closes no loop that encloses anything: it goes nowhere; as many modes as joints lose nothing."""
     one = Swimmer(SAND, Chain(LENGTHS, modes=[[1, -0.5, 0.3]]))
     back_and_forth = Fourier(cos=[[0.5, 0.1]], sin=[[0.2, 0.3]])
-    assert tiers(one) == ("adapted", "path", "direct")
+    assert available_tiers(one) == ("adapted", "path", "direct")
     for tier in ("path", "direct"):
         moved = SceneTables(
             Scene(one, back_and_forth).with_numerics(grid=9, phases=256)

@@ -21,7 +21,7 @@ from geomech.io import tables
 from geomech.optimisation import optimise
 from geomech.scenes import Numerics, Scene, kinds, parse
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.single import single
+from geomech.studies.single import diagnosed_velocity
 from geomech.systems.base import Cycle, integrated
 from rft.core.refusal import Refusal
 from rft.core.registry import REGISTRIES
@@ -298,7 +298,7 @@ def test_five_members_and_functions_go_through_everything(system, tmp_path):
     assert found.value > np.hypot(*truth[-1, :2])
     plots.save(plots.displacement_figure({"circle": result}), tmp_path / "a.png")
     plots.save(plots.ccf_figure(study.curvature), tmp_path / "b.png")
-    assert single(scene.system, [0.1, 0.2], [1.0, 0.0])["status"] == "exact"
+    assert diagnosed_velocity(scene.system, [0.1, 0.2], [1.0, 0.0])["status"] == "exact"
     assert description(scene).startswith(
         f"scene: {getattr(system, '__name__', 'Cart')}, circle gait"
     )

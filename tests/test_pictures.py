@@ -24,8 +24,8 @@ from geomech.plots.precision import SETTINGS as PRECISION
 from geomech.questions.texts import colour_limit
 from geomech.scenes.measurements import read
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.settings import Measured, padded
-from geomech.studies.settings import variables as of_measured
+from geomech.studies.settings import Measurements, padded_array
+from geomech.studies.settings import measurement_variables as of_measured
 from geomech.studies.tiered import SETTINGS
 from geomech.systems.base import shape_labels
 from geomech.tiers import TIERS
@@ -486,11 +486,11 @@ def test_the_map_of_a_sweep_lies_as_its_parameters():
 def studied(rows, amplitudes=1):
     """An accuracy study of rows (setting, errors, seconds)."""
     settings, errors, seconds = zip(*rows)
-    measured = Measured(
+    measured = Measurements(
         settings,
-        padded([setting.values for setting in settings]),
-        padded(seconds),
-        {"error": padded(errors)},
+        padded_array([setting.values for setting in settings]),
+        padded_array(seconds),
+        {"error": padded_array(errors)},
     )
     amplitude = Variable("amplitude", ("amplitude",), np.ones(amplitudes))
     found = of_measured(measured, "BL", {"error": "rms"})

@@ -12,7 +12,7 @@ from geomech.io.results import write_csv
 from geomech.questions.base import Question
 from geomech.run.cost import Cost
 from geomech.run.runner import runner
-from geomech.studies.settings import order
+from geomech.studies.settings import measured_order
 from rft.core.refusal import Refusal
 
 PHASE = Variable("phase", ("phase",), np.array([0.0, 1.5, 3.0]), "rad", "of the gait")
@@ -128,5 +128,5 @@ def test_a_result_is_a_mapping_of_variables():
 def test_an_order_is_that_of_the_error_in_the_coarseness(values, sign):
     values = np.array(values, float)
     errors = values ** (sign * 3)
-    assert order(values, errors) == pytest.approx(3.0)
-    assert np.isnan(order(values, np.array([*errors[:2], 1e-14, 1e-14])))
+    assert measured_order(values, errors) == pytest.approx(3.0)
+    assert np.isnan(measured_order(values, np.array([*errors[:2], 1e-14, 1e-14])))

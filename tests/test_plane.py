@@ -14,9 +14,9 @@ from geomech.geometry.plane import Plane, ProjectedGait, interpolated_plane, pla
 from geomech.geometry.traits import Traits
 from geomech.geometry.two_form import spanned, spanned_by, two_form
 from geomech.scenes.frames import framed
-from geomech.studies.choose import cheapest
+from geomech.studies.choose import cheapest_displacements
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.shape_space import through as _held
+from geomech.studies.shape_space import plane_origin as _held
 from geomech.systems import Swimmer
 from geomech.tiers import TIERS
 from geomech.tiers.fitted import finest_grid, is_too_large
@@ -431,13 +431,13 @@ def test_what_hangs_on_the_surface_is_part_of_every_estimate(monkeypatch):
         planned(TIERS["adapted"], balances=lambda *asked: 10**8),
     )
     monkeypatch.setattr("geomech.studies.choose.solved_phases", lambda *asked: 10**9)
-    assert tabled(cheapest(scene, [0.4, 0.5], 0.02))["tier"] != "area"
+    assert tabled(cheapest_displacements(scene, [0.4, 0.5], 0.02))["tier"] != "area"
     monkeypatch.setitem(
         TIERS._parts,
         "area",
         planned(TIERS["area"], spread=lambda *asked: np.full((2, 2), 0.01)),
     )
-    found = tabled(cheapest(scene, [0.4, 0.5], 0.02))
+    found = tabled(cheapest_displacements(scene, [0.4, 0.5], 0.02))
     assert found["tier"] == "area" and min(found["estimate"]["area"]) == 0.01
 
 

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from tabled import of_json, of_swept
 
 from geomech import plots, scenes
-from geomech.studies.grid import changed
+from geomech.studies.grid import with_parameter
 from rft.core.refusal import Refusal
 from rft.terradynamics.plates import StressMap
 from rft.terradynamics.walking import Fineness, Screws, Tripod, Walker, cruise
@@ -163,15 +163,15 @@ def test_what_makes_no_craft_is_refused_with_one_line(right):
 
 
 def test_sizes_of_screws_are_swept():
-    tables = changed(tomllib.loads(SMALL), "robot.screw.pitch", 0.04)
+    tables = with_parameter(tomllib.loads(SMALL), "robot.screw.pitch", 0.04)
     assert (
         tables["robot"]["screw"]["pitch"] == 0.04
         and scenes.from_tables(tables).robot.screw.core == 0.02
     )
-    assert changed(tables, "robot.track", 0.2)["robot"]["track"] == 0.2
+    assert with_parameter(tables, "robot.track", 0.2)["robot"]["track"] == 0.2
     for wrong in ("robot.legs.width", "robot.mass.kg"):
         with pytest.raises(Refusal, match="name a parameter such as"):
-            changed(tables, wrong, 1.0)
+            with_parameter(tables, wrong, 1.0)
     results = {
         "over": {"robot.screw.pitch": [0.04, 0.06]},
         "speed": np.ones(2),

@@ -15,7 +15,7 @@ from geomech import scenes
 from geomech.gaits import Circle
 from geomech.io.results import from_dict
 from geomech.studies import report, sweep, undulation
-from geomech.studies.choose import cheapest
+from geomech.studies.choose import cheapest_displacements
 from geomech.studies.scene_tables import SceneTables
 from geomech.systems import Swimmer
 from rft import BodyInertia, GrainInertia
@@ -127,7 +127,7 @@ def test_from_python_too():
         ]
         == 2.5
     )
-    assert [g.frequency for g in report.compared(scene)] == [
+    assert [g.frequency for g in report.compared_gaits(scene)] == [
         2.5
     ] * 3  # those that `run` adds, too
 
@@ -162,7 +162,7 @@ def test_every_displacement_is_a_speed():
         "speed_body_lengths",
         "turning_rate",
     }
-    answer = cheapest(scene, amplitudes, 1e-2)
+    answer = cheapest_displacements(scene, amplitudes, 1e-2)
     distance = answer["net_distance"].values
     np.testing.assert_allclose(answer["speed"].values, 2.5 * distance)
 
@@ -285,7 +285,7 @@ def test_the_command_gives_it(tmp_path):
 
 @pytest.mark.parametrize("top", [0.03, 0.22, 1.0, 1.3247, 2.5, 7.0, 999.0, 1e-5, 4e5])
 def test_amplitudes_of_tables_are_round(top):
-    steps = report.steps(top)
+    steps = report.round_amplitudes(top)
     assert (
         6 <= len(steps) <= 15
         and steps[-1] <= top * (1 + 1e-9) < steps[-1] + 1.01 * steps[0]

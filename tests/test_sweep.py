@@ -242,7 +242,7 @@ def test_an_interrupted_sweep_resumes_from_the_file_it_is_given(
             raise KeyboardInterrupt
         return rows(at, amplitudes)
 
-    monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", 2)
+    monkeypatch.setattr(cycles, "BATCH_SIZE", 2)
     whole = swept_table(sweep.sweep(GLASS, over))
     monkeypatch.setattr(cycles, "_rows", failing)
     with pytest.raises(KeyboardInterrupt) as ended:
@@ -347,12 +347,13 @@ def test_rows_find_their_points_whatever_varies_fastest_or_changes_nothing():
         rows, np.stack([10 * length, amplitude, 1.0 + 0 * frequency], -1)
     )
     assert np.array_equal(
-        grid.at_points(over, ("gait", "physical", "frequency"), 7.0), frequency
+        grid.values_at_points(over, ("gait", "physical", "frequency"), 7.0), frequency
     )
     assert np.array_equal(
-        grid.at_points(over, ("physical", "frequency"), 7.0), np.full((3, 2, 4), 7.0)
+        grid.values_at_points(over, ("physical", "frequency"), 7.0),
+        np.full((3, 2, 4), 7.0),
     )
-    assert grid.at_points(over, ("physical", "frequency"), None) is None
+    assert grid.values_at_points(over, ("physical", "frequency"), None) is None
 
 
 def test_corners_of_a_grid_are_tried_and_some_of_many_values_along_its_edges():

@@ -19,7 +19,7 @@ from geomech.scenes import Scene
 from geomech.studies import cost, estimate, fields
 from geomech.studies.available import default_tiers
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.single import single
+from geomech.studies.single import diagnosed_velocity
 from geomech.systems import KINDS, NoSlipSnake, Swimmer
 from geomech.systems.base import WrappedSystem, kind_of, length_unit
 from geomech.systems.capabilities import stored_table
@@ -193,7 +193,7 @@ def test_singular_shapes_are_refused_by_name_in_integrals():
     with pytest.raises(
         ValueError, match="the shape is singular: the wheels' axles meet in one point"
     ):
-        single(study.scene.system, [0.4, 0.4], [1.0, 0.0])
+        diagnosed_velocity(study.scene.system, [0.4, 0.4], [1.0, 0.0])
 
 
 def test_files_and_words_say_what_is_singular(tmp_path):
@@ -248,7 +248,7 @@ def test_what_a_system_says_of_itself_holds(name):
     )
     poses, errors = estimate.direct(scene, AWAY, np.array([0.5, 1.0]), 64)
     assert poses.shape == (2, 3) and errors.shape == (2, 2)
-    assert cost.price(cost.direct(scene, AWAY, 2, 64)).balances >= 128
+    assert cost.total_cost(cost.direct_jobs(scene, AWAY, 2, 64)).balances >= 128
 
 
 def test_whatever_has_a_velocity_is_a_system():

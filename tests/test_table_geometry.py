@@ -227,7 +227,7 @@ def test_metrics_of_files_from_elsewhere_are_their_own(sources, tmp_path):
     bare(files[".mat"], tmp_path / "a.mat", **M)
     table = on(tmp_path / "a.mat", sign="+")
     np.testing.assert_array_equal(table.metric.M, study.metric.M)
-    assert effort.units(table.scene.system)["path_length"] == effort.METRIC
+    assert effort.units(table.scene.system)["path_length"] == effort.METRIC_UNIT
     assert np.isnan(table.effort()["work"]).all()
     bare(files[".mat"], tmp_path / "a.mat", **{**M, "M12": 9.0 + M["M12"]})
     with pytest.raises(

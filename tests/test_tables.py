@@ -34,7 +34,7 @@ from geomech.io.tables.mat import ERROR
 from geomech.scenes import Numerics, Scene
 from geomech.studies import choose, estimate, fields, tiered
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.single import single
+from geomech.studies.single import diagnosed_velocity
 from geomech.systems import NoSlipSnake, Swimmer, Table
 from geomech.systems.base import length_unit
 from geomech.systems.capabilities import stored_table, table_error
@@ -506,7 +506,7 @@ def test_what_is_even_in_alphadot_is_part_of_the_error(ending, tmp_path):
 def test_a_bare_mat_file_becomes_netcdf_that_says_what_it_does_not_know(made, tmp_path):
     plain_mat(tmp_path / "a.mat", made[1].fitted)
     bare = SceneTables(Scene(Table(tmp_path / "a.mat"), GAIT))
-    assert single(bare.scene.system, [0.2, 0.3], [1, 0])["residual"] is None
+    assert diagnosed_velocity(bare.scene.system, [0.2, 0.3], [1, 0])["residual"] is None
     fields.save_connection(tmp_path / "a.nc", bare)
     held = tables.load(tmp_path / "a.nc")
     np.testing.assert_array_equal(held.connection.A, made[1].fitted.A)
@@ -944,12 +944,12 @@ def test_what_accuracy_costs_includes_the_tables_own_error(made, monkeypatch):
     assert (error[tolerances > own] > own).all()
     assert (error[tolerances > own] <= tolerances[tolerances > own]).all()
     assert f"the system's own, {own:.1e} BL" in str(found)
-    monkeypatch.setattr(choose, "MOST_PHASES", 256)
+    monkeypatch.setattr(choose, "MAX_PHASES", 256)
     with pytest.raises(
         Refusal,
         match="no tier gets to 1e-06 .*: raise tolerance, or take a finer table",
     ):
-        choose.cheapest(scene, [0.5], 1e-6)
+        choose.cheapest_displacements(scene, [0.5], 1e-6)
 
 
 # What a NetCDF file holds, part by part.

@@ -14,7 +14,7 @@ from geomech.geometry import connection, family, harmonics
 from geomech.scenes import Numerics, Scene
 from geomech.studies import estimate
 from geomech.studies.available import default_tiers
-from geomech.studies.choose import cheapest
+from geomech.studies.choose import cheapest_displacements
 from geomech.studies.scene_tables import SceneTables
 from geomech.systems import Swimmer
 from geomech.tiers import TIERS, Plan, Tier, fitted
@@ -443,7 +443,7 @@ def test_a_tier_is_one_expression(monkeypatch):
     off = estimate.distance(np.array(table["leading"]), np.array(table["direct"]))
     assert (off <= table["estimate"]["leading"]).all() and off[1] > 0.01
     assert "leading" in default_tiers(scene.system)
-    assert tabled(cheapest(scene, [0.05, 1.0], 1e-4))["tier"] == "direct"
+    assert tabled(cheapest_displacements(scene, [0.05, 1.0], 1e-4))["tier"] == "direct"
     with pytest.raises(
         Refusal,
         match="the leading tier takes a body of joints, this body has 4: use direct",
@@ -469,7 +469,7 @@ MANY = np.linspace(0.3, 2.0, 201)
 @pytest.mark.parametrize("every", [100, 2])
 @pytest.mark.parametrize("tol", [1e-2, 1e-3, 1e-5])
 def test_the_cheapest_tier_meets_the_tolerance(tol, every, truths):
-    answer = tabled(cheapest(GLASS, MANY[::every], tol))
+    answer = tabled(cheapest_displacements(GLASS, MANY[::every], tol))
     (told,) = answer["estimate"].values()
     assert [*answer["estimate"]] == [answer["tier"]] and max(told) <= tol
     true = truths(
@@ -483,7 +483,7 @@ def test_the_cheapest_tier_meets_the_tolerance(tol, every, truths):
 
 def test_a_table_pays_for_many_amplitudes_and_not_for_few():
     few, many = (
-        tabled(cheapest(GLASS, np.linspace(0.3, 2.0, n), 2e-3))["tier"]
+        tabled(cheapest_displacements(GLASS, np.linspace(0.3, 2.0, n), 2e-3))["tier"]
         for n in (3, 400)
     )
     assert (few, many) == ("direct", "adapted")
@@ -496,7 +496,10 @@ def test_the_position_decides_and_not_the_heading(error, tier, monkeypatch):
     monkeypatch.setattr(
         "geomech.studies.choose.against_direct", lambda *_: np.tile(error, (400, 1))
     )
-    assert tabled(cheapest(GLASS, np.linspace(0.3, 2.0, 400), 2e-3))["tier"] == tier
+    assert (
+        tabled(cheapest_displacements(GLASS, np.linspace(0.3, 2.0, 400), 2e-3))["tier"]
+        == tier
+    )
 
 
 def test_errors_of_rules_are_those_of_each_amplitude():
@@ -538,9 +541,13 @@ def test_what_the_solver_left_counts_in_the_estimate():
 
 def test_impossible_tolerances_are_refused():
     with pytest.raises(Refusal, match="no tier gets to 1e-15 body lengths"):
-        tabled(cheapest(GLASS.with_numerics(regularisation=1e-4), [1.0], 1e-15))
+        tabled(
+            cheapest_displacements(
+                GLASS.with_numerics(regularisation=1e-4), [1.0], 1e-15
+            )
+        )
     with pytest.raises(Refusal, match="tolerance must be"):
-        tabled(cheapest(GLASS, [1.0], 0.0))
+        tabled(cheapest_displacements(GLASS, [1.0], 0.0))
 
 
 def test_the_map_of_a_family_gives_each_shape_its_own_value():
@@ -568,11 +575,11 @@ def test_the_map_of_a_family_gives_each_shape_its_own_value():
 
 def test_every_amplitude_must_meet_the_tolerance(monkeypatch):
     """The refinement goes on to the largest number of phases that is allowed, for the worst of the amplitudes."""
-    monkeypatch.setattr("geomech.studies.choose.MOST_PHASES", 128)
+    monkeypatch.setattr("geomech.studies.choose.MAX_PHASES", 128)
     with pytest.raises(
         Refusal, match="no tier gets to 1e-09 body lengths .* with 128 phases"
     ):
-        tabled(cheapest(GLASS, [0.0, 1.0], 1e-9))
+        tabled(cheapest_displacements(GLASS, [0.0, 1.0], 1e-9))
 
 
 @pytest.mark.parametrize(
@@ -580,7 +587,9 @@ def test_every_amplitude_must_meet_the_tolerance(monkeypatch):
 )
 def test_the_search_for_a_tier_starts_with_few_phases(effects, phases):
     scene = GLASS.changed(effects=effects).with_numerics(cycles=1)
-    assert tabled(cheapest(scene, [0.5], 10.0))["settings"] == {"phases": phases}
+    assert tabled(cheapest_displacements(scene, [0.5], 10.0))["settings"] == {
+        "phases": phases
+    }
 
 
 def test_estimates_are_in_body_lengths_and_in_tables_in_the_unit_of_their_poses():
@@ -653,7 +662,7 @@ def test_what_is_to_come_of_further_phases_is_a_geometric_series(r):
     sum_from = lambda first, ratio: (
         estimate.SAFETY * first * (ratio ** np.arange(1, 100)).sum()
     )
-    assert estimate._remaining(*changes, 0.0) == pytest.approx(
+    assert estimate._remaining_error(*changes, 0.0) == pytest.approx(
         sum_from(changes[2], min(r, 0.5))
     )
     slowest = (
@@ -661,10 +670,10 @@ def test_what_is_to_come_of_further_phases_is_a_geometric_series(r):
         if r <= 0.5
         else sum_from(changes[2], 0.5)
     )
-    assert estimate._remaining(*changes, 0.25) == pytest.approx(slowest)
+    assert estimate._remaining_error(*changes, 0.25) == pytest.approx(slowest)
     scattered = (
-        estimate._remaining(1e-6, 4e-3, 1e-5, 0.25),
-        estimate._remaining(1e-6, 4e-3, 3e-3, 0.25),
+        estimate._remaining_error(1e-6, 4e-3, 1e-5, 0.25),
+        estimate._remaining_error(1e-6, 4e-3, 3e-3, 0.25),
     )
     assert scattered == pytest.approx((sum_from(2e-3, 0.5), sum_from(3e-3, 0.5)))
 
@@ -686,7 +695,7 @@ def test_between_amplitudes_that_are_compared_the_worse_neighbour_counts(
         SimpleNamespace(system=SimpleNamespace(length=0.2)),
     )
     poses = np.stack([0.6 * k, -0.8 * k, 2.0 * k], -1)
-    found = estimate.against_direct(
+    found = estimate.errors_from_direct(
         scene, poses, SimpleNamespace(harmonics=9), amplitudes
     )
     ((some, phases),) = asked
@@ -699,5 +708,7 @@ def test_between_amplitudes_that_are_compared_the_worse_neighbour_counts(
     np.testing.assert_allclose(
         found, np.stack([5 * worse + 0.5, 2 * worse + 7.0], -1), rtol=1e-12
     )
-    estimate.against_direct(scene, poses, SimpleNamespace(harmonics=1), amplitudes[:20])
+    estimate.errors_from_direct(
+        scene, poses, SimpleNamespace(harmonics=1), amplitudes[:20]
+    )
     assert (len(asked[1][0]), asked[1][1]) == (20, 64)

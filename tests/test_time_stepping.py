@@ -11,8 +11,8 @@ from geomech.gaits import Butterfly, Circle, Ellipse, Sine
 from geomech.geometry.reconstruct import displacement
 from geomech.scenes import Scene
 from geomech.studies import estimate, tiered, undulation
-from geomech.studies.batch import side_by_side
-from geomech.studies.choose import cheapest
+from geomech.studies.batch import joined_scene
+from geomech.studies.choose import cheapest_displacements
 from geomech.studies.scene_tables import SceneTables
 from geomech.systems import Swimmer
 from rft import (
@@ -207,7 +207,7 @@ def test_transients_slow_the_sandfish():
     effects = [Transient(travel=share * wave) for share in (0.0, 0.1, 0.2, 0.4, 0.525)]
     head = SANDFISH.system.effects
     slowed = [SANDFISH.changed(effects=(*head, effect)) for effect in effects]
-    net = np.hypot(*side_by_side(slowed).cycle(phases=64).net.T[:2])
+    net = np.hypot(*joined_scene(slowed).cycle(phases=64).net.T[:2])
     lost = 1 - net / net[0]
     assert (np.diff(lost) > 0).all()
     assert lost[2] == pytest.approx(0.090, abs=0.003)
@@ -315,7 +315,7 @@ def test_cycles_that_do_not_repeat_are_not_taken_for_periodic():
 def test_a_tolerance_below_what_time_stepping_repeats_to_is_refused():
     slowed = scenes.load("sandfish-transient")
     with pytest.raises(Refusal, match="repeat to 1e-06 only: raise tolerance"):
-        tabled(cheapest(slowed, [0.2], 1e-7))
+        tabled(cheapest_displacements(slowed, [0.2], 1e-7))
 
 
 def test_pauses_and_empty_batches():
@@ -443,7 +443,7 @@ def test_estimates_of_marches_cover_the_truth(truths):
             body=Backbone(30), effects=(effect,), gait=Sine(elements=30)
         )
         a = np.array([0.12, 0.22, 0.35])
-        found, *parts, _ = estimate.in_groups(scene, scene.gait, a, 64)
+        found, *parts, _ = estimate.direct_with_error_parts(scene, scene.gait, a, 64)
         error = sum(parts)
         truth = truths("marches", periodic, (effect,), scene.gait, Backbone(30), 256, a)
         off = estimate.pose_distance(found, truth, body_size(scene.system.body))
@@ -557,18 +557,18 @@ def test_a_tolerance_refines_pieces_or_is_refused(monkeypatch):
         Circle(amplitude=1.2),
     )
     scene = scene.with_numerics(pieces=5)
-    found = tabled(cheapest(scene, [1.2], 1e-5))
+    found = tabled(cheapest_displacements(scene, [1.2], 1e-5))
     assert found["settings"]["pieces"] > 5
     truth = SceneTables(scene.with_numerics(pieces=640)).poses("direct", None, [1.2])
     off = estimate.distance(np.array(found[found["tier"]]), truth)
     assert (off <= found["estimate"][found["tier"]]).all()
     assert max(found["estimate"][found["tier"]]) <= 1e-5
-    monkeypatch.setattr("geomech.studies.choose.FINEST_PIECES", 40)
+    monkeypatch.setattr("geomech.studies.choose.MAX_PIECES", 40)
     with pytest.raises(
         Refusal,
         match="no tier gets to 1e-08 body lengths .* with .* phases and 40 pieces",
     ):
-        tabled(cheapest(scene, [1.2], 1e-8))
+        tabled(cheapest_displacements(scene, [1.2], 1e-8))
 
 
 def test_a_setting_for_pieces():
@@ -576,8 +576,8 @@ def test_a_setting_for_pieces():
         effects=(DepthProfile(along=(0.5, 2, 1)),)
     )
     setting = next(k for k in tiered.SETTINGS if k.name == "pieces")
-    assert tiered.applies(setting, depth)
-    assert not tiered.applies(setting, depth.changed(effects=()))
+    assert tiered.is_applicable(setting, depth)
+    assert not tiered.is_applicable(setting, depth.changed(effects=()))
     a = np.linspace(0.5, 1.5, 8)
     far = SceneTables(depth.with_numerics(pieces=320, phases=64)).poses(
         "direct", Circle(), a

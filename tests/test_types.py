@@ -21,9 +21,9 @@ from geomech.geometry import connection, curvature, family, harmonics, reconstru
 from geomech.geometry.field import Field
 from geomech.scenes import IntruderScene, MeshScene, Numerics, Scene, WalkerScene, kinds
 from geomech.studies import sweep, undulation
-from geomech.studies.choose import cheapest
+from geomech.studies.choose import cheapest_displacements
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.single import single
+from geomech.studies.single import diagnosed_velocity
 from geomech.systems import Solver, Swimmer
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
@@ -215,16 +215,19 @@ def geometries(value):
         undulation.activation,
     ):
         yield "a scene", lambda of=of: of(value)
-    yield "a scene", lambda: tabled(cheapest(value, [1.0], 0.1))
+    yield "a scene", lambda: tabled(cheapest_displacements(value, [1.0], 0.1))
     yield "a scene", lambda: swept_table(sweep.sweep(value, {"gait.amplitude": [1.0]}))
     yield "over", lambda: swept_table(sweep.sweep(plain, value))
     yield "a list", lambda: swept_table(sweep.sweep(plain, {"gait.amplitude": value}))
-    yield "a list", lambda: tabled(cheapest(plain, value, 0.1))
-    yield "gait of the scene", lambda: tabled(cheapest(plain, [1.0], 0.1, value))
+    yield "a list", lambda: tabled(cheapest_displacements(plain, value, 0.1))
+    yield (
+        "gait of the scene",
+        lambda: tabled(cheapest_displacements(plain, [1.0], 0.1, value)),
+    )
     yield "gait of the scene", lambda: SceneTables(plain).table("adapted", value)
     yield "tier", lambda: SceneTables(plain).plan(value)
     yield "system", lambda: plain.changed(system=value)
-    yield "one shape", lambda: single(plain.system, value, [1, 0])
+    yield "one shape", lambda: diagnosed_velocity(plain.system, value, [1, 0])
     for tier in (path, direct):
         yield "velocity", lambda tier=tier: tier(value, Circle())
         yield "gait", lambda tier=tier: tier(velocity, value)
@@ -254,7 +257,7 @@ def geometries(value):
     yield "file", lambda: Centreline(file=value)
     for name in ("loads", "grid", "phases", "extent"):
         yield "a change", lambda name=name: plain.with_numerics(**{name: value})
-    yield "tolerance", lambda: tabled(cheapest(plain, [1.0], value))
+    yield "tolerance", lambda: tabled(cheapest_displacements(plain, [1.0], value))
 
 
 TAKEN = {

@@ -13,9 +13,9 @@ from geomech.gaits import Butterfly, Ellipse
 from geomech.io.results import from_dict
 from geomech.scenes import Scene
 from geomech.studies import sweep, uncertainty
-from geomech.studies.choose import cheapest
+from geomech.studies.choose import cheapest_displacements
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.tables import QUANTITIES, of_pose
+from geomech.studies.tables import QUANTITIES, pose_quantities
 from geomech.systems import Swimmer, capability
 from geomech.systems.capabilities import Uncertain
 from rft import Chain, Granular, SkinFriction, Transient, Viscous
@@ -41,7 +41,7 @@ def drawn(sand, draws, amplitudes, phases=16):
     """QUANTITIES (draws, B, 4) in media of a scene with parameters off by the rows of ``draws``."""
     systems = [capability(sand.system, Uncertain).varied(d) for d in draws]
     nets = [s.run(*sand.gait.cycle(phases, np.array(amplitudes))).net for s in systems]
-    return np.stack([np.stack(list(of_pose(n).values()), -1) for n in nets])
+    return np.stack([np.stack(list(pose_quantities(n).values()), -1) for n in nets])
 
 
 def whitened(count, size, seed):
@@ -59,8 +59,8 @@ def whitened(count, size, seed):
 def test_media_drawn_from_the_covariance_scatter_as_told(monkeypatch):
     monkeypatch.setattr(uncertainty, "PHASES", 16)
     sand, amplitudes = scene(granular()), [0.7, 1.2]
-    told = uncertainty.of_medium(sand, GAIT, np.array(amplitudes))
-    media = whitened(100, 2, seed=1) @ uncertainty.root(COVARIANCE).T
+    told = uncertainty.medium_spread(sand, GAIT, np.array(amplitudes))
+    media = whitened(100, 2, seed=1) @ uncertainty.covariance_root(COVARIANCE).T
     nets = drawn(sand, np.concatenate([media, -media]), amplitudes)
     scatter, shift = (
         nets.std(0),
@@ -84,8 +84,8 @@ def test_in_a_frame_that_depends_on_the_medium_media_have_their_own(monkeypatch)
     in_frame = lambda system: (
         SceneTables(sand.changed(system=system)).in_frame("minimum-perturbation").scene
     )
-    told = uncertainty.of_medium(in_frame(sand.system), GAIT, amplitudes)
-    media = whitened(12, 2, seed=2) @ uncertainty.root(COVARIANCE).T
+    told = uncertainty.medium_spread(in_frame(sand.system), GAIT, amplitudes)
+    media = whitened(12, 2, seed=2) @ uncertainty.covariance_root(COVARIANCE).T
     at = lambda d: (
         in_frame(Swimmer(Granular(1.49 + d[0], 0.22 + d[1]), BODY))
         .system.run(*GAIT.cycle(16, amplitudes))
@@ -93,7 +93,7 @@ def test_in_a_frame_that_depends_on_the_medium_media_have_their_own(monkeypatch)
     )
     nets = np.stack(
         [
-            np.stack(list(of_pose(at(d)).values()), -1)
+            np.stack(list(pose_quantities(at(d)).values()), -1)
             for d in [[0.0, 0.0], *media, *-media]
         ]
     )
@@ -108,7 +108,7 @@ def test_in_a_frame_that_depends_on_the_medium_media_have_their_own(monkeypatch)
 def test_the_second_order_of_a_quadratic_is_exact(monkeypatch):
     """For a displacement quadratic in the parameters, y = a + b z + z C z / 2: variance |b|^2 + tr(C^2) / 2 over normal z."""
     bend, slope = np.array([[3.0, 1.0], [1.0, -2.0]]), np.array([0.4, -0.3])
-    root = uncertainty.root(COVARIANCE)
+    root = uncertainty.covariance_root(COVARIANCE)
 
     class Quadratic:
         length, covariance = 2.0, COVARIANCE
@@ -122,9 +122,9 @@ def test_the_second_order_of_a_quadratic_is_exact(monkeypatch):
         z = np.linalg.solve(root, system.step)
         return np.outer(amplitudes, [slope @ z, slope @ z + z @ bend @ z / 2, 0.0])
 
-    monkeypatch.setattr(uncertainty, "_moved", moved)
+    monkeypatch.setattr(uncertainty, "_net_poses", moved)
     sand = type("Sand", (), {"system": Quadratic(), "name": "sand"})()
-    told = uncertainty.of_medium(sand, GAIT, np.array([1.0, 3.0]))
+    told = uncertainty.medium_spread(sand, GAIT, np.array([1.0, 3.0]))
     assert told["rule"] == ["second order"] * 2
     np.testing.assert_allclose(told["x"], 0.5 * np.array([1, 3]))
     np.testing.assert_allclose(
@@ -136,7 +136,7 @@ def test_the_second_order_of_a_quadratic_is_exact(monkeypatch):
     np.testing.assert_allclose(told["shift"]["x"], 0.0, atol=1e-12)
     assert (told["heading"] == 0).all()
     bend *= 0.01
-    told = uncertainty.of_medium(sand, GAIT, np.array([1.0]))
+    told = uncertainty.medium_spread(sand, GAIT, np.array([1.0]))
     assert told["rule"] == ["linear"]
     np.testing.assert_allclose(told["y"], 0.5)
 
@@ -145,8 +145,8 @@ def test_a_wide_covariance_is_carried_on_to_second_order(monkeypatch):
     """Where the drag is almost the same in all directions, the turn of a viscous swimmer is far from linear in its ratio."""
     monkeypatch.setattr(uncertainty, "PHASES", 16)
     wide = scene(Viscous(1.15, ((0.3**2,),)))
-    told = uncertainty.of_medium(wide, GAIT, np.array([0.7]))
-    near = uncertainty.of_medium(
+    told = uncertainty.medium_spread(wide, GAIT, np.array([0.7]))
+    near = uncertainty.medium_spread(
         scene(Viscous(1.15, ((0.03**2,),))), GAIT, np.array([0.7])
     )
     assert (told["rule"], near["rule"]) == (["second order"], ["linear"])
@@ -166,7 +166,7 @@ def test_wide_media_shift_the_mean_and_it_is_told(monkeypatch):
         sand = Scene(Swimmer(medium, Chain()), gait, name="sand").with_numerics(
             phases=64
         )
-        told = uncertainty.of_medium(sand, gait, np.array([1.2]))
+        told = uncertainty.medium_spread(sand, gait, np.array([1.2]))
         assert told["x"] == pytest.approx(told["net_distance"], rel=1e-3)
         media = np.concatenate([d := whitened(60, 2, seed=5), -d]) * share * spread
         media = media[(media + [1.8, 0.24] > [0.0, 0.001]).all(1)]
@@ -178,7 +178,7 @@ def test_wide_media_shift_the_mean_and_it_is_told(monkeypatch):
         )
         tables[share] = SceneTables(sand).displacements([1.2], ["direct"])
         errors[share] = told["shift"]["net_distance"][0] / told["net_distance"][0]
-    assert errors[1.0] < -0.3 and -uncertainty.SHIFTED < errors[0.1] < 0
+    assert errors[1.0] < -0.3 and -uncertainty.SMALLEST_SHIFT < errors[0.1] < 0
     wide, narrow = (str(tables[share]) for share in (1.0, 0.1))
     size = abs(tables[1.0]["medium_shift"].values[3, 0])
     assert f"mean over the media: net distance shifted by up to {size:.1e}" in wide
@@ -198,18 +198,20 @@ def test_media_that_end_before_the_points_are_carried_on_from_nearer_ones():
         len(both) == 1
         and uncertainty.sigma_points(scene(granular()))[0] == uncertainty.DEVIATIONS
     )
-    assert np.isfinite(uncertainty.of_medium(sand, GAIT, np.array([1.0]))["x"]).all()
+    assert np.isfinite(
+        uncertainty.medium_spread(sand, GAIT, np.array([1.0]))["x"]
+    ).all()
 
 
 def test_roots():
     for matrix, rank in (
         (COVARIANCE, 2), (((4.0, 6.0), (6.0, 9.0)), 1), (((1e-12, 0.0), (0.0, 1e6)), 2), (((0.0, 0.0), (0.0, 2.0)), 1)
     ):  # fmt: skip
-        root = uncertainty.root(matrix)
+        root = uncertainty.covariance_root(matrix)
         np.testing.assert_allclose(root @ root.T, matrix, rtol=1e-12, atol=1e-30)
         assert root.shape == (2, rank)
-    assert uncertainty.root(((0.0, 0.0), (0.0, 0.0))).shape == (2, 0)
-    certain = uncertainty.of_medium(
+    assert uncertainty.covariance_root(((0.0, 0.0), (0.0, 0.0))).shape == (2, 0)
+    certain = uncertainty.medium_spread(
         scene(Granular(1.49, 0.22, covariance=np.zeros((2, 2)))), GAIT, np.array([1.0])
     )
     assert certain["position"] == [0.0] and certain["rule"] == ["linear"]
@@ -218,7 +220,7 @@ def test_roots():
 def test_every_tier_has_it_beside_its_own_error():
     sand = scene(granular()).with_numerics(grid=7, phases=64)
     table = tabled(SceneTables(sand).displacements([0.5, 1.0], ["area", "direct"]))
-    told = uncertainty.of_medium(sand, GAIT, np.array([0.5, 1.0]))
+    told = uncertainty.medium_spread(sand, GAIT, np.array([0.5, 1.0]))
     for tier in ("area", "direct"):
         np.testing.assert_allclose(table["medium_error"][tier], told["position"])
         np.testing.assert_allclose(table["medium_error_heading"][tier], told["heading"])
@@ -234,7 +236,7 @@ def test_every_tier_has_it_beside_its_own_error():
         k: table[k] for k in ("area", "direct", "x")
     }
     assert not [key for key in plain if key.startswith("medium")]
-    answer = cheapest(sand, [0.5, 1.0], 1e-2)
+    answer = cheapest_displacements(sand, [0.5, 1.0], 1e-2)
     spread = np.hypot(answer["x"].spread, answer["y"].spread)
     np.testing.assert_allclose(spread[0], told["position"])
     shown = str(SceneTables(sand).displacements([0.5, 1.0], ["area", "direct"]))
@@ -252,7 +254,7 @@ def test_effects_and_time_stepping_feel_it(monkeypatch):
             .changed(effects=effects)
             .with_numerics(cycles=1)
         )
-        told = uncertainty.of_medium(sand, GAIT, np.array([1.0]))
+        told = uncertainty.medium_spread(sand, GAIT, np.array([1.0]))
         nets = [
             sand.changed(medium=Viscous(2.5 + h)).cycle(phases=16).net
             for h in (0.01, -0.01)
@@ -275,7 +277,7 @@ def test_it_costs_what_is_told():
     assert (
         more
         == 6 * 2 * uncertainty.PHASES
-        == uncertainty.points(sand.system) * 2 * uncertainty.PHASES
+        == uncertainty.n_systems(sand.system) * 2 * uncertainty.PHASES
     )
 
 
@@ -290,7 +292,7 @@ def test_a_covariance_that_reaches_no_medium_is_refused_before_computing(
     ):
         tabled(SceneTables(wide).displacements([1.0], ["direct"]))
     with pytest.raises(Refusal, match="there is no medium"):
-        cheapest(wide, [1.0], 1e-2)
+        cheapest_displacements(wide, [1.0], 1e-2)
     with pytest.raises(Refusal, match="there is no medium"):
         swept_table(sweep.sweep(wide, {"gait.amplitude": [1.0]}))
     with pytest.raises(Refusal, match="there is no medium"):  # at one end only
@@ -316,7 +318,7 @@ def test_the_command_gives_it(tmp_path):
     code, out, err = geomech(*args, cwd=tmp_path)
     assert (code, err) == (0, "")
     found, loaded = from_dict(json.loads(out)), scenes.load(tmp_path / "s.toml")
-    told = uncertainty.of_medium(loaded, loaded.gait, np.array([1.0]))
+    told = uncertainty.medium_spread(loaded, loaded.gait, np.array([1.0]))
     spread = np.hypot(found["x"].spread, found["y"].spread)
     assert spread[0] == pytest.approx(told["position"])
     assert "medium, one standard deviation" in (tmp_path / "d.svg").read_text()
@@ -330,7 +332,7 @@ def test_sweeps_have_it(tmp_path):
     )
     over = {"body.length": [0.3, 0.6], "gait.amplitude": [0.5, 1.0]}
     found = swept_table(sweep.sweep(sand, over))
-    told = uncertainty.of_medium(sand, GAIT, np.array([0.5, 1.0]))
+    told = uncertainty.medium_spread(sand, GAIT, np.array([0.5, 1.0]))
     np.testing.assert_allclose(
         found["medium_error"], [told["position"], 2 * told["position"]], rtol=1e-6
     )
@@ -344,7 +346,7 @@ def test_sweeps_have_it(tmp_path):
         again["medium_error"][0, 0], told["position"][1], rtol=1e-6
     )
     turned = dataclasses.replace(GAIT, tilt=0.5)
-    told = uncertainty.of_medium(sand, turned, np.array([1.0]))["position"]
+    told = uncertainty.medium_spread(sand, turned, np.array([1.0]))["position"]
     np.testing.assert_allclose(again["medium_error"][1], told, rtol=1e-6)
     many = swept_table(
         sweep.sweep(sand, {"gait.amplitude": np.linspace(0.1, 1.0, 70).tolist()})

@@ -239,7 +239,7 @@ OVER = {
 def test_a_sweep_has_the_same_digits_whoever_computes(
     at_once, two, given_away, monkeypatch
 ):
-    monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", at_once)
+    monkeypatch.setattr(cycles, "BATCH_SIZE", at_once)
     here, shared = both(
         two, lambda: swept_table(sweep.sweep(GLASS, OVER)), at_once < 64
     )
@@ -355,7 +355,7 @@ def power(tmp_path, own_parts):
 
 def test_plugins_are_known_to_workers(power, two, given_away, monkeypatch):
     """By their text, which need not be a file where they are."""
-    monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", 1)
+    monkeypatch.setattr(cycles, "BATCH_SIZE", 1)
     scene, over = (
         GLASS.changed(medium=power(1.0)),
         {"medium.power": [0.8, 0.9, 1.0, 1.1, 1.2]},

@@ -25,7 +25,7 @@ from geomech.scenes import (
     toml,
 )
 from geomech.studies import cost, undulation
-from geomech.studies.choose import cheapest
+from geomech.studies.choose import cheapest_displacements
 from geomech.studies.scene_tables import SceneTables
 from geomech.studies.sweep import sweep
 from geomech.systems import NoSlipSnake, Swimmer
@@ -114,14 +114,14 @@ def scenes() -> list[Any]:
         study.fitted,
         study.curvature,
         study.tiers,
-        cheapest(scene, [0.5], 1e-3),
+        cheapest_displacements(scene, [0.5], 1e-3),
         sweep(scene, {"gait.amplitude": [0.5]}),
     )
     asked = (
         geomech.fit_log,
         geomech.measured.Fitted,
         geomech.accuracy,
-        cost.price,
+        cost.total_cost,
         undulation.performance,
         undulation.activation,
         text,

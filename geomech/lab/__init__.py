@@ -27,7 +27,7 @@ from geomech.geometry.gait import LARGEST
 from geomech.io.files import atomic_file
 from geomech.scenes.key import keys_of
 from geomech.scenes.write import text_of, without_gait
-from geomech.studies.charts import SHARES, Chart, Family, series_of
+from geomech.studies.charts import RESIDUAL_SHARES, Chart, Family, fourier_series
 from geomech.systems.base import body_size, length_unit, shape_labels
 from rft.core.refusal import Refusal
 
@@ -135,7 +135,7 @@ def data(charts: list[Chart]) -> dict[str, Any]:
     return {
         "version": VERSION,
         "colours": colours,
-        "shares": SHARES,
+        "shares": RESIDUAL_SHARES,
         "gaits": _gait_keys(),
         "largest": LARGEST,
         "scenes": scenes,
@@ -222,7 +222,7 @@ def _gait(gait: Gait) -> dict[str, Any]:
     }
     if isinstance(gait, Points):
         return {**shared, "points": [list(p) for p in gait.points]}
-    mean, cos, sin = series_of(gait)
+    mean, cos, sin = fourier_series(gait)
     shared["centre"] = (gait.middle + gait.amplitude * mean).tolist()
     return {**shared, "cos": cos.tolist(), "sin": sin.tolist()}
 

@@ -11,8 +11,8 @@ from geomech.optimisation import loops as series
 from geomech.optimisation.cycles import CycleValues, cycle_values
 from geomech.optimisation.request import Request
 from geomech.studies import estimate
-from geomech.studies.effort import change_by_elements
-from geomech.studies.elements import elements_of
+from geomech.studies.effort import effort_error_by_elements
+from geomech.studies.elements import n_elements
 from geomech.systems.base import body_size
 from geomech.systems.capabilities import OwnMetric, capability
 
@@ -100,11 +100,11 @@ def _length_error(request: Request, alpha, alphadot, P, length: float) -> float:
     root = 1 / request.degree
     coarse = 2 * np.pi * (P[::2] ** root).mean()
     error = abs(length - coarse)
-    if elements_of(system):
+    if n_elements(system):
         # A quarter of the phases is enough for the effect of the elements.
         quarter = 2 * np.pi * (P[::4] ** root).mean()
         values = np.array([[quarter, np.nan]])
-        error += change_by_elements(
+        error += effort_error_by_elements(
             system, alpha[None, ::4], alphadot[None, ::4], values
         )[0, 0]
     return error

@@ -201,17 +201,17 @@ class Request:
 
         # The gait of the scene and the results are evaluated with their errors.
         phases = max(scene.numerics.phases, PHASES)
-        jobs = cost.direct(scene, self.gait, 3 + improved, phases)
+        jobs = cost.direct_jobs(scene, self.gait, 3 + improved, phases)
         if self.uses_tables:
             own_frame = scene.changed(system=self.system)
-            jobs += cost.harmonics(own_frame.with_numerics(extent=self.extent))
+            jobs += cost.harmonic_jobs(own_frame.with_numerics(extent=self.extent))
 
         # The ascents themselves: steps, cycles per step, gaits per cycle.
         gaits_per_cycle = 1 + 4 * self.system.joints
         if self.uses_runs:
             gaits_per_cycle = 1 + 2 * int(np.prod(loops.shape))
         gaits = int(self._direct_steps(improved) * TRIES * gaits_per_cycle)
-        jobs += cost.direct(
+        jobs += cost.direct_jobs(
             scene,
             self.gait,
             gaits,
@@ -220,7 +220,7 @@ class Request:
             checked=False,
             all_phases=True,
         )
-        total = cost.price(jobs)
+        total = cost.total_cost(jobs)
         seconds = SECONDS_PER_ASCENT * (self.ascents + 1)
         return total._replace(
             seconds=total.seconds + seconds, besides=total.besides + seconds

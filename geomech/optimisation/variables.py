@@ -15,8 +15,8 @@ from geomech.optimisation.optimum import Optimum
 from geomech.scenes.model import Scene
 from geomech.scenes.write import toml
 from geomech.studies import fields
-from geomech.studies.effort import units, why_none
-from geomech.studies.tables import COMPONENTS, zero_words
+from geomech.studies.effort import units, why_no_metric
+from geomech.studies.tables import COMPONENTS, zero_reason
 from geomech.systems.base import body_size, length_unit, shape_labels
 from rft.core.refusal import Refusal
 
@@ -88,7 +88,7 @@ def displacement(optimum: Optimum) -> list[Variable]:
     ):
         zero = ""
         if name in reasons:
-            zero = zero_words(reasons[name])
+            zero = zero_reason(reasons[name])
         label = "net displacement per cycle"
         found.append(Variable(name, (), value, unit, label, error, zero=zero))
 
@@ -181,6 +181,6 @@ def check_stretch(scene: Scene) -> None:
             where=scene.name,
             instead="drop it",
         )
-    reason = why_none(scene.system)
+    reason = why_no_metric(scene.system)
     if reason:
         raise Refusal(reason, where=scene.name, instead="drop ``stretch``")

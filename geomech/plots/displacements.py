@@ -15,7 +15,7 @@ from geomech.core.variables import Result
 from geomech.geometry.field import UNKNOWN_UNIT
 from geomech.plots.style import axes_of, figure, shared_legend, styled
 from geomech.scenes.measurements import converted, units_of
-from geomech.studies.tables import QUANTITIES, of_pose
+from geomech.studies.tables import QUANTITIES, pose_quantities
 from geomech.tiers import TIERS, Tier
 from rft.core.refusal import printable
 
@@ -353,5 +353,5 @@ def net(poses: Any) -> np.ndarray:
     >>> net(np.array([[0.3, 0.4, 0.0], [-0.3, 0.0, 0.0]]))
     array([ 0.5, -0.3])
     """
-    quantities = of_pose(poses)
+    quantities = pose_quantities(poses)
     return np.copysign(quantities["net_distance"], quantities["x"])

@@ -16,7 +16,7 @@ from rft.core.checks import in_range
 
 if TYPE_CHECKING:
     from geomech.scenes import Intruding, Scene, WalkerScene
-    from geomech.studies.accuracy import Adjustable
+    from geomech.studies.accuracy import AccuracySubject
 
 SHOWN = (
     "best_setting",
@@ -49,10 +49,10 @@ class Accuracy(Question):
     parallel: ClassVar[bool] = True
 
     @cached_property
-    def adjustable(self) -> "Adjustable":
+    def adjustable(self) -> "AccuracySubject":
         from geomech.studies import accuracy
 
-        return accuracy.adjustable(self.scene, self.runs)
+        return accuracy.accuracy_subject(self.scene, self.runs)
 
     def check(self) -> None:
         if self.runs is not None:

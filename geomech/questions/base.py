@@ -109,15 +109,16 @@ class Question(Plain):
     The class itself presents every result of its kind, computed or read from a file:
     `headline`, `summary`, `remarks`, `draw`, `files`.
 
-    less: advice where it costs too much. worth_saying: seconds of computing from which on
+    cheaper_alternative: advice where it costs too much. report_above: seconds of
+    computing from which on
     a command prints the cost. parallel: whether other processes can take a part. folder:
     whether its command fills a folder by its function `fill`, whose keywords are options
     of the command; default_folder: its name where none is given. unlimited: whether it is
     computed whatever it costs. consent_beyond: what its command asks consent for."""
 
     name: ClassVar[str]
-    less: ClassVar[str] = "ask for less"
-    worth_saying: ClassVar[float] = 5.0
+    cheaper_alternative: ClassVar[str] = "ask for less"
+    report_above: ClassVar[float] = 5.0
     parallel: ClassVar[bool] = False
     folder: ClassVar[bool] = False
     default_folder: ClassVar[str] = ""

@@ -39,7 +39,7 @@ class Ccf(Question):
     stretched: bool = field(default=False, kw_only=True)
 
     name: ClassVar[str] = "ccf"
-    worth_saying: ClassVar[float] = 1.0
+    report_above: ClassVar[float] = 1.0
     parallel: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
@@ -62,8 +62,8 @@ class Ccf(Question):
         return f"field of {self.scene.name}"
 
     @property
-    def less(self) -> str:  # type: ignore[override]
-        return self.plan.less
+    def cheaper_alternative(self) -> str:  # type: ignore[override]
+        return self.plan.cheaper_alternative
 
     @cached_property
     def plan(self) -> "Plan":
@@ -142,9 +142,9 @@ class Ccf(Question):
         if self.sliced:
             facts["interpolation"] = space.planes[0].ccf.degree
             found = [
-                *shape_space.slices(space.planes),
-                *shape_space.plane_ccfs("ccf", space.planes),
-                *shape_space.plane_ccfs("other_ccf", space.other_planes),
+                *shape_space.slice_variables(space.planes),
+                *shape_space.ccf_variables("ccf", space.planes),
+                *shape_space.ccf_variables("other_ccf", space.other_planes),
             ]
             return Result("ccf", tuple(found), facts)
         tables = space.study

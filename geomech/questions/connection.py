@@ -91,7 +91,7 @@ class Connection(Question):
     drawn: bool = field(default=False, kw_only=True)
 
     name: ClassVar[str] = "connection"
-    worth_saying: ClassVar[float] = 1.0
+    report_above: ClassVar[float] = 1.0
     parallel: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
@@ -110,8 +110,8 @@ class Connection(Question):
         return f"field of {self.scene.name}"
 
     @property
-    def less(self) -> str:  # type: ignore[override]
-        return self.plan.less
+    def cheaper_alternative(self) -> str:  # type: ignore[override]
+        return self.plan.cheaper_alternative
 
     @cached_property
     def plan(self) -> "Plan":
@@ -185,9 +185,9 @@ class Connection(Question):
         ]
         if space.planes:
             dims = {v.name for v in found.variables}
-            slices = shape_space.slices(space.planes)
+            slices = shape_space.slice_variables(space.planes)
             more += [v for v in slices if v.name not in dims]
-            more += shape_space.plane_connections(space.planes)
+            more += shape_space.connection_variables(space.planes)
         facts = {**found.attributes, **facts_of(tables)}
         if self.contents:
             facts["contents"] = " ".join(self.contents)

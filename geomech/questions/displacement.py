@@ -87,13 +87,13 @@ class Displacement(Question):
 
         jobs = []
         if self.effort:
-            jobs = cost.of_effort(self.scene, len(self.values))
+            jobs = cost.effort_jobs(self.scene, len(self.values))
         if self.tolerance is None:
             tables = Run().tables_of(self.scene)
             return tables.cost(self.values, self.tiers, self.gait, more=jobs)
         # The cost of a tolerance is known only once a tier has run: `allow` is called
         # before each.
-        return cost.price(jobs)
+        return cost.total_cost(jobs)
 
     def compute(self, run: Run) -> Result:
         if self.tolerance is None:
@@ -111,17 +111,19 @@ class Displacement(Question):
 
     def _cheapest(self, run: Run) -> Result:
         from geomech.studies import cost
-        from geomech.studies.choose import cheapest
+        from geomech.studies.choose import cheapest_displacements
 
         effort = []
         if self.effort:
-            effort = cost.of_effort(self.scene, len(self.values))
+            effort = cost.effort_jobs(self.scene, len(self.values))
 
         def ask(jobs: list) -> None:
-            run.allow(cost.price([*jobs, *effort]))
+            run.allow(cost.total_cost([*jobs, *effort]))
 
         tolerance = cast(float, self.tolerance)
-        return cheapest(self.scene, self.values, tolerance, self.gait, ask)
+        return cheapest_displacements(
+            self.scene, self.values, tolerance, self.gait, ask
+        )
 
     def check_draw(self, component: Sequence[str] = (), data: Any = None) -> None:
         measured_points(data, self.scene, component)
@@ -258,13 +260,13 @@ def errors_of_others(result: Result) -> str:
 def shift_words(result: Result) -> Iterable[str]:
     """Yield how far uncertain media shift the mean of a quantity, where that
     matters."""
-    from geomech.studies.uncertainty import SEEN, SHIFTED
+    from geomech.studies.uncertainty import SMALLEST_SHIFT, SMALLEST_SPREAD
 
     length = result.attributes["body_length"]
     for k, name in enumerate(result["quantity"].values.tolist()):
         shift = np.abs(result["medium_shift"].values[k])
-        least = SEEN if name == "heading" else SEEN * length
-        matters = shift > np.maximum(SHIFTED * result[name].spread[0], least)
+        least = SMALLEST_SPREAD if name == "heading" else SMALLEST_SPREAD * length
+        matters = shift > np.maximum(SMALLEST_SHIFT * result[name].spread[0], least)
         if matters.any():
             largest = size(float(shift.max()))
             title = name.replace("_", " ")

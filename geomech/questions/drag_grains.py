@@ -96,7 +96,7 @@ class DragGrains(Question):
 
     name: ClassVar[str] = "drag_grains"
     table: ClassVar[tuple[str, ...]] = ("bed", "attack_angle")
-    less: ClassVar[str] = "take fewer ``beds`` or ``angles``"
+    cheaper_alternative: ClassVar[str] = "take fewer ``beds`` or ``angles``"
     consent_beyond: ClassVar[str] = "ten minutes"
     parallel: ClassVar[bool] = True
 

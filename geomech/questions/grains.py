@@ -45,7 +45,7 @@ class Grains(Question):
 
     name: ClassVar[str] = "grains"
     table: ClassVar[tuple[str, ...]] = ("t",)
-    less: ClassVar[str] = "take fewer ``cycles``"
+    cheaper_alternative: ClassVar[str] = "take fewer ``cycles``"
     consent_beyond: ClassVar[str] = "ten minutes"
 
     @property

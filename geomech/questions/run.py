@@ -86,9 +86,9 @@ class Run(Question):
     @staticmethod
     def headline(result: Result) -> list[str]:
         """Return what the tables are: of the scene's own gait first."""
-        from geomech.studies.report import tables_of
+        from geomech.studies.report import gait_tables
 
-        (_, own), *others = tables_of(result).items()
+        (_, own), *others = gait_tables(result).items()
         lines = Displacement.headline(own)
         for gait, table in others:
             lines += [
@@ -100,20 +100,20 @@ class Run(Question):
     @staticmethod
     def summary(result: Result) -> Result:
         """Return what is shown first of the displacements of each gait."""
-        from geomech.studies.report import is_own, prefixed, tables_of
+        from geomech.studies.report import gait_tables, is_of_one_gait, with_gait_prefix
 
-        (_, own), *others = tables_of(result).items()
+        (_, own), *others = gait_tables(result).items()
         variables = [*Displacement.summary(own).variables]
         for gait, table in others:
             shown = Displacement.summary(table).variables
-            variables += [prefixed(v, gait) for v in shown if is_own(v)]
+            variables += [with_gait_prefix(v, gait) for v in shown if is_of_one_gait(v)]
         return replace(result, variables=tuple(variables))
 
     @staticmethod
-    def remarks(result: Result) -> list[str]:
-        from geomech.studies.report import tables_of
+    def remarks(result: "Result") -> list[str]:
+        from geomech.studies.report import gait_tables
 
-        (_, own), *others = tables_of(result).items()
+        (_, own), *others = gait_tables(result).items()
         lines = Displacement.remarks(own)
         for gait, table in others:
             remarks = Displacement.remarks(table)
@@ -125,12 +125,12 @@ class Run(Question):
         """Draw displacements against amplitude, a row a gait; return the Figure."""
         from geomech import plots
         from geomech.results.scenes import scene_of
-        from geomech.studies.report import tables_of
+        from geomech.studies.report import gait_tables
 
         if isinstance(data, str):
             data = measured_points(data, scene_of(result), component)
         return plots.displacement_figure(
-            tables_of(result), components=component, data=data
+            gait_tables(result), components=component, data=data
         )
 
     @staticmethod
@@ -149,13 +149,13 @@ class Run(Question):
         from geomech.scenes.write import toml
         from geomech.studies import report
 
-        shapes = report.connection_of(result)
+        shapes = report.connection_only(result)
         if "A" in shapes:
             save(shapes, folder / FIELD)
             save_maps(result, folder, component, clim)
         figure = Run.draw(result, component=component, data=data)
         save_figure(figure, folder / "displacement")
-        save(report.displacements_of(result), folder / TABLES)
+        save(report.displacements_only(result), folder / TABLES)
         write_text(folder / SCENE, toml(scene_of(result)))
 
 
@@ -165,7 +165,7 @@ def save_maps(result: Result, folder: Path, component: Any, clim: Any) -> None:
     from geomech import plots
     from geomech.results.fields import connection_of, field_of, slices_of
     from geomech.results.scenes import scene_of
-    from geomech.studies.report import compared
+    from geomech.studies.report import compared_gaits
     from geomech.systems.base import shape_labels
 
     scene = scene_of(result)
@@ -178,7 +178,7 @@ def save_maps(result: Result, folder: Path, component: Any, clim: Any) -> None:
     else:
         connection = plots.connection_figure(connection_of(result), **options)
         field, error = field_of(result, "ccf")
-        gaits = compared(scene)
+        gaits = compared_gaits(scene)
         ccf = plots.ccf_figure(field, gaits, error=error, clim=clim, **options)
     save_figure(connection, folder / "connection")
     save_figure(ccf, folder / "ccf")

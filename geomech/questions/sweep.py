@@ -62,13 +62,13 @@ class Sweep(Question):
     def cost(self) -> Cost:
         return self.plan.cost
 
-    def compute(self, run: Run) -> Result:
-        from geomech.studies.sweep import stored_in
+    def compute(self, run: Run) -> "Result":
+        from geomech.studies.sweep import store_batches
 
         seconds = None
         if "cost" in vars(self.plan):  # a command has asked for it
             seconds = self.plan.cost.seconds
-        with stored_in(self.partial, self.scene):
+        with store_batches(self.partial, self.scene):
             return self.plan.result(run.progress, seconds)
 
     @staticmethod

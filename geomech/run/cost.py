@@ -79,15 +79,17 @@ class Cost(NamedTuple):
         of_balances = self.seconds - self.besides
         return self._replace(seconds=self.besides + factor * of_balances)
 
-    def check(self, place: str, yes: bool, less: str = "ask for less") -> None:
-        """Raise `TooLong` beyond the limits unless ``yes``. less: advice on a smaller
-        request."""
+    def check(
+        self, place: str, yes: bool, cheaper_alternative: str = "ask for less"
+    ) -> None:
+        """Raise `TooLong` beyond the limits unless ``yes``. cheaper_alternative: advice
+        on a smaller request."""
         if not yes and (self.seconds > LONGEST or self.memory > LARGEST):
             limits = f"{duration(LONGEST)} or {_size(LARGEST)}"
             raise TooLong(
                 str(self),
                 where=place,
-                instead=f"to compute for more than {limits} say ``yes``, or {less}",
+                instead=f"to compute for more than {limits} say ``yes``, or {cheaper_alternative}",
             )
 
 

@@ -19,13 +19,13 @@ from geomech.core.setting import Setting
 from geomech.core.variables import Result, Variable
 from geomech.run.cost import Cost
 from geomech.run.runner import runner
-from geomech.studies.settings import Measured, padded, variables
+from geomech.studies.settings import Measurements, measurement_variables, padded_array
 
 KINDS = {"robot": "walking", "intruder": "intrusion"}  # loaded only where needed
 DIGITS = 3  # of seconds: a second run differs in the second
 
 
-class Adjustable(Protocol):
+class AccuracySubject(Protocol):
     """An answer whose approximations can be set: the subject of an accuracy study.
 
     about: the answer in words. unit: of its errors, which ``measures`` has with their
@@ -43,12 +43,12 @@ class Adjustable(Protocol):
     def cost(self) -> Cost:
         """Return the cost of all settings, each run ``runs`` times."""
 
-    def prepared(self) -> Self:
+    def with_shared_data(self) -> Self:
         """Return the subject with the data that all settings share, computed once."""
 
     def settings(self) -> list[Setting]: ...
 
-    def numbers(self, setting: Setting | None, value: Any) -> list[np.ndarray]:
+    def evaluate(self, setting: Setting | None, value: Any) -> list[np.ndarray]:
         """Return the answer at a value of a setting; for None the limit of the setting,
         without a setting the truth."""
 
@@ -57,14 +57,14 @@ class Adjustable(Protocol):
     ) -> dict[str, float]:
         """Return the error of an answer by measure."""
 
-    def choices(self, measured: Measured) -> list[Variable]:
+    def choices(self, measured: Measurements) -> list[Variable]:
         """Return which values meet tolerances, and other variables of the whole study."""
 
     def facts(self) -> dict[str, Any]:
         """Return attributes of the whole study."""
 
 
-def adjustable(scene: Any, runs: int | None = None) -> Adjustable:
+def accuracy_subject(scene: Any, runs: int | None = None) -> AccuracySubject:
     """Return the subject of an accuracy study of a scene: a displacement, forces along a
     motion, or the speed of a robot."""
     module = "tiered"
@@ -77,26 +77,26 @@ def adjustable(scene: Any, runs: int | None = None) -> Adjustable:
     return kind(scene, runs)
 
 
-def answer(subject: Adjustable, progress: Callable | None = None) -> Result:
+def answer(subject: AccuracySubject, progress: Callable | None = None) -> Result:
     """Return error and seconds at every value of the settings of a subject.
 
     Each value is timed ``runs`` times, and the quickest counts, so that first calls that
     load and warm up do not. Seconds are CPU seconds of one thread."""
-    subject = subject.prepared()
+    subject = subject.with_shared_data()
     measured = measure(subject, progress)
     found = [
-        *variables(measured, subject.unit, subject.measures),
+        *measurement_variables(measured, subject.unit, subject.measures),
         *subject.choices(measured),
     ]
     facts = {"about": subject.about, **subject.facts()}
     return Result("accuracy", tuple(found), facts)
 
 
-def measure(subject: Adjustable, progress: Callable | None) -> Measured:
+def measure(subject: AccuracySubject, progress: Callable | None) -> Measurements:
     """Return the runs of a subject at all values of its settings."""
     settings = subject.settings()
-    tasks = [*tasks_of(settings, subject.runs)]
-    answers = runner().map(answered, subject, tasks, len(tasks), progress=progress)
+    tasks = [*list_tasks(settings, subject.runs)]
+    answers = runner().map(timed_answer, subject, tasks, len(tasks), progress=progress)
     truth = None
     if tasks[0][0] is None:
         truth, _ = next(answers)
@@ -114,15 +114,15 @@ def measure(subject: Adjustable, progress: Callable | None) -> Measured:
             seconds[-1].append(took)
             for name, error in subject.errors(numbers, reference).items():
                 errors[name][-1].append(error)
-    return Measured(
+    return Measurements(
         settings,
-        padded([setting.values for setting in settings]),
-        padded(seconds),
-        {name: padded(rows) for name, rows in errors.items()},
+        padded_array([setting.values for setting in settings]),
+        padded_array(seconds),
+        {name: padded_array(rows) for name, rows in errors.items()},
     )
 
 
-def tasks_of(settings: list[Setting], runs: int) -> Iterator[tuple]:
+def list_tasks(settings: list[Setting], runs: int) -> Iterator[tuple]:
     """Yield (setting, value, runs): without a setting the truth, if any setting is
     compared to that; without a value the limit of the setting."""
     if any(setting.against == "truth" for setting in settings):
@@ -134,7 +134,7 @@ def tasks_of(settings: list[Setting], runs: int) -> Iterator[tuple]:
             yield setting, value, runs
 
 
-def answered(
+def timed_answer(
     subject: Any, task: tuple[Setting | None, Any, int]
 ) -> tuple[list[np.ndarray], float]:
     """Return the answer at a setting, and the seconds that the quickest of its runs
@@ -143,6 +143,6 @@ def answered(
     times = []
     for _ in range(runs):
         start = time.thread_time()
-        numbers = subject.numbers(setting, value)
+        numbers = subject.evaluate(setting, value)
         times.append(time.thread_time() - start)
     return numbers, float(f"{min(times):.{DIGITS}g}")

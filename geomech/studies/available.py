@@ -6,11 +6,11 @@ from geomech.systems.base import System
 from geomech.tiers import TIERS
 
 
-def tiers(system: System) -> tuple[str, ...]:
+def available_tiers(system: System) -> tuple[str, ...]:
     """Return the names of all tiers that can predict displacements of the system, cheapest look-up first."""
     return tuple(name for name, tier in TIERS.items() if tier.is_offered(system))
 
 
 def default_tiers(system: System) -> tuple[str, ...]:
     """Return the tiers of a plain study: without those whose tables serve one family of gaits only."""
-    return tuple(name for name in tiers(system) if TIERS[name].common)
+    return tuple(name for name in available_tiers(system) if TIERS[name].common)

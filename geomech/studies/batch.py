@@ -13,7 +13,7 @@ from geomech.systems import Swimmer
 from rft.effects import batched_effect
 
 
-def kind(scene: Scene) -> str:
+def batch_key(scene: Scene) -> str:
     """Return a text that is equal for scenes that can share a batch."""
     effects = [
         (
@@ -31,7 +31,7 @@ def kind(scene: Scene) -> str:
     return repr((rest, scene.numerics, scene.gait.joints, s.traits.lacks, effects))
 
 
-def side_by_side(scenes: list[Scene], amplitudes=None) -> Scene:
+def joined_scene(scenes: list[Scene], amplitudes=None) -> Scene:
     """Return one scene with the gaits and effects of several, each for all amplitudes or its own one."""
     count = 1 if amplitudes is None else len(amplitudes)
     gaits = GaitBatch(tuple(s.gait for s in scenes), amplitudes)

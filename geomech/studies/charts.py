@@ -31,16 +31,16 @@ from geomech.tiers import harmonic
 from rft.core.refusal import Refusal, located
 from rft.formulas import se2
 
-SMALL = 1e-7  # of the largest coefficient: harmonics below it are left out
-ENDS = 33  # points of a body's outline at most
-SHARES = (
+SMALLEST_HARMONIC = 1e-7  # of the largest coefficient: harmonics below it are left out
+MAX_ENDS = 33  # points of a body's outline at most
+RESIDUAL_SHARES = (
     0.35,
     0.45,
 )  # of what the series leaves along a loop, by which positions and headings of 95 % of loops are off at most
-TRIED = 12  # loops by which the error of the grid, and that between members of a family, are measured
-SAMPLES = 64  # of a gait that is no Fourier series
+N_LOOPS = 12  # loops by which the error of the grid, and that between members of a family, are measured
+N_SAMPLES = 64  # of a gait that is no Fourier series
 REACH = 0.85  # of the field on either side, within which those loops have their points
-HALVED = 0.25  # of what half the grid changes is the grid's error: of order 2, less than splines of smooth media have
+HALF_GRID_SHARE = 0.25  # of what half the grid changes is the grid's error: of order 2, less than splines of smooth media have
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class Family:
     """Scenes that differ in one parameter: the tables of a chart have a leading axis along it, of spline coefficients.
 
     key: of the parameter. values: of the members, ascending, one of them the scene's own. knots, degree: of the spline. error:
-    distance, body lengths, up to which interpolated tables change net positions of `TRIED` loops."""
+    distance, body lengths, up to which interpolated tables change net positions of `N_LOOPS` loops."""
 
     key: str
     values: np.ndarray
@@ -102,13 +102,13 @@ class Chart:
         """Highest harmonic of the direction of alphadot."""
         return self.harmonics.shape[-1] // 3 - 1
 
-    def at(self, value: float) -> Chart:
+    def member(self, value: float) -> Chart:
         """Return the chart of a member of the family, or of a scene between two of them."""
         if self.family is None:
             raise Refusal("this chart is that of one scene, and not of a family")
         f = self.family
         between = 0.0 if value in f.values else f.error * body_size(self.scene.system)
-        return _mapped(
+        return _map_tables(
             replace(self, family=None, between=between),
             lambda x: _spline((f.knots,), (f.degree,), x)([[value]])[0],
         )
@@ -164,8 +164,9 @@ def tiers(
 
     frame: the scene's own if None. phases: of a cycle; the page takes 256.
 
-    The harmonic tier is off by the error of the grid and by a share (`SHARES`) of what the series leaves along the loop, the
-    other two by their distance from it, besides."""
+    The harmonic tier is off by the error of the grid and by a share (`RESIDUAL_SHARES`)
+    of what the series leaves along the loop, the other two by their distance from it,
+    besides."""
     frame = frame or chart.scene.frame
     alpha, alphadot = gait.cycle(phases)
     inside(chart.axes, alpha)
@@ -175,7 +176,7 @@ def tiers(
         displacement(chart.xi("harmonic", alpha, alphadot, frame)),
         alpha[0],
     )
-    own = left_error(chart, alpha, alphadot)
+    own = harmonic_error(chart, alpha, alphadot)
     found = {"harmonic": Prediction(net, own)}
     area = (
         2 * np.pi * (chart._splines[frame, "area"](alpha) * alphadot[..., 1:]).mean(-2)
@@ -190,7 +191,7 @@ def tiers(
     return found
 
 
-def left_error(
+def harmonic_error(
     chart: Chart, alpha: np.ndarray, alphadot: np.ndarray
 ) -> tuple[float, float]:
     """Return the error of the harmonic tier for one cycle (P, 2): of position, and of heading."""
@@ -204,7 +205,9 @@ def left_error(
         speed
     )
     position, heading = (
-        2 * np.pi * (SHARES * along + speed.mean() * np.array(chart.grid_error))
+        2
+        * np.pi
+        * (RESIDUAL_SHARES * along + speed.mean() * np.array(chart.grid_error))
     )
     return float(position) + chart.between, float(heading)
 
@@ -256,36 +259,36 @@ def chart(scene: Scene) -> Chart:
     """Return the chart of a scene. Refusal for one without harmonics, or without a body to draw."""
     refuse(scene)
     study = SceneTables(scene)
-    fitted, series = study.fitted, _series(study)
-    frames = {scene.frame: _frame(fitted)}
+    fitted, series = study.fitted, _significant_harmonics(study)
+    frames = {scene.frame: _frame_tables(fitted)}
     if scene.frame != MINIMUM_PERTURBATION:
         other = study.in_frame(MINIMUM_PERTURBATION)
-        frames[MINIMUM_PERTURBATION] = _frame(
+        frames[MINIMUM_PERTURBATION] = _frame_tables(
             other.fitted, other.scene.system.field.field
         )
     field = series.field
     made = Chart(
-        scene, series.axes, tuple(field.spline.t), series.degree, _coefficients(field), _single(_last(series.residual)),
+        scene, series.axes, tuple(field.spline.t), series.degree, _coefficients(field), _single_precision(_components_last(series.residual)),
         _coefficients(_outline(scene, series)), frames, (0.0, 0.0),
     )  # fmt: skip
     return replace(made, grid_error=_grid_error(series))
 
 
-def _series(study: SceneTables) -> Harmonics:
+def _significant_harmonics(study: SceneTables) -> Harmonics:
     """Return the harmonics of a scene without those that are next to nothing; where xi = A alphadot, A alone."""
     if study.scene.system.traits.linear:
         A = study.fitted
         return Harmonics(A.axes, A.A, A.residual, A.degree)
     series = study.compute_harmonics()
     size = np.abs(series.coefficients).max((0, 2, 3)).reshape(-1, 2).max(-1)
-    count = 1 + int(np.flatnonzero(size > SMALL * size.max()).max())
+    count = 1 + int(np.flatnonzero(size > SMALLEST_HARMONIC * size.max()).max())
     return replace(series, coefficients=series.coefficients[:, : 2 * count])
 
 
-def _frame(connection: Connection, pose: Field | None = None) -> FrameTables:
+def _frame_tables(connection: Connection, pose: Field | None = None) -> FrameTables:
     map_ = ccf(connection)
     return FrameTables(
-        _coefficients(connection.field), _coefficients(map_), _single(_last(error(connection).values)),
+        _coefficients(connection.field), _coefficients(map_), _single_precision(_components_last(error(connection).values)),
         None if pose is None else _coefficients(pose),
     )  # fmt: skip
 
@@ -297,7 +300,7 @@ def _outline(scene: Scene, series: Harmonics) -> Field:
         grid, np.zeros((*grid.shape[:2], 3))
     )
     some = np.unique(
-        np.linspace(0, ends.shape[-2] - 1, min(ENDS, ends.shape[-2]))
+        np.linspace(0, ends.shape[-2] - 1, min(MAX_ENDS, ends.shape[-2]))
         .round()
         .astype(int)
     )
@@ -309,7 +312,7 @@ def _outline(scene: Scene, series: Harmonics) -> Field:
 
 
 def loops(
-    axes: tuple[np.ndarray, ...], count: int = TRIED, seed: int = 1
+    axes: tuple[np.ndarray, ...], count: int = N_LOOPS, seed: int = 1
 ) -> list[Points]:
     """Return closed curves through random shapes, within a field."""
     rng, found = np.random.default_rng(seed), []
@@ -325,13 +328,13 @@ def loops(
     return found
 
 
-def series_of(gait: Gait) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def fourier_series(gait: Gait) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the unit curve of a gait as a Fourier series: its mean (2,), and coefficients (cos, sin), (2, K) each; of one that
     is no series the first terms of its own."""
     if hasattr(gait, "coefficients"):
         return np.zeros(2), *gait.coefficients()
-    unit = gait.unit(2 * np.pi * np.arange(SAMPLES) / SAMPLES)
-    terms = np.fft.rfft(unit, axis=0)[1 : SAMPLES // 4] * 2 / SAMPLES
+    unit = gait.unit(2 * np.pi * np.arange(N_SAMPLES) / N_SAMPLES)
+    terms = np.fft.rfft(unit, axis=0)[1 : N_SAMPLES // 4] * 2 / N_SAMPLES
     return unit.mean(0), terms.real.T, -terms.imag.T
 
 
@@ -345,7 +348,7 @@ def _grid_error(series: Harmonics) -> tuple[float, float]:
         )
         length = 2 * np.pi * np.linalg.norm(alphadot, axis=-1).mean()
         rates.append(np.array([np.hypot(*off[:2]), abs(off[2])]) / length)
-    return tuple((HALVED * np.median(rates, 0)).tolist())
+    return tuple((HALF_GRID_SHARE * np.median(rates, 0)).tolist())
 
 
 def family(
@@ -362,7 +365,9 @@ def family(
 
     degree = min(3, len(values) - 1)
     knots = make_interp_spline(values, np.asarray(values), degree).t
-    stacked = lambda some: _single(make_interp_spline(values, np.stack(some), degree).c)
+    stacked = lambda some: _single_precision(
+        make_interp_spline(values, np.stack(some), degree).c
+    )
     parts = {
         name: stacked([getattr(m, name) for m in members])
         for name in ("harmonics", "residual", "outline")
@@ -382,16 +387,19 @@ def family(
         grid_error=worst,
         family=Family(key, np.array(values), knots, degree, own),
     )
-    off = max(_off(made.at(v), one) for v, one in zip(middles(values), between))
+    off = max(
+        _largest_difference(made.member(v), one)
+        for v, one in zip(midpoints(values), between)
+    )
     return replace(made, family=replace(made.family, error=off))
 
 
-def middles(values: list[float]) -> list[float]:
+def midpoints(values: list[float]) -> list[float]:
     """Return the values halfway from one to the next."""
     return [(a + b) / 2 for a, b in pairwise(values)]
 
 
-def _off(one: Chart, other: Chart) -> float:
+def _largest_difference(one: Chart, other: Chart) -> float:
     """Return the largest distance, body lengths, between net positions of two charts."""
     nets = [
         [tiers(c, gait)["harmonic"].net for gait in loops(one.axes)]
@@ -403,7 +411,7 @@ def _off(one: Chart, other: Chart) -> float:
     )
 
 
-def _mapped(chart: Chart, f) -> Chart:
+def _map_tables(chart: Chart, f) -> Chart:
     """Return the chart with all of its tables through a function."""
     parts = {
         name: f(getattr(chart, name)) for name in ("harmonics", "residual", "outline")
@@ -418,13 +426,15 @@ def _mapped(chart: Chart, f) -> Chart:
 
 def _coefficients(field: Field) -> np.ndarray:
     """Return the coefficients of the spline through a field, components last, (N_1, N_2, K)."""
-    return _single(np.asarray(field.spline.c).reshape(*map(len, field.axes), -1))
+    return _single_precision(
+        np.asarray(field.spline.c).reshape(*map(len, field.axes), -1)
+    )
 
 
-def _last(values: np.ndarray) -> np.ndarray:
+def _components_last(values: np.ndarray) -> np.ndarray:
     return np.moveaxis(values, 0, -1)
 
 
-def _single(values: np.ndarray) -> np.ndarray:
+def _single_precision(values: np.ndarray) -> np.ndarray:
     """Return values rounded to single precision."""
     return np.ascontiguousarray(values, np.float32)

@@ -13,17 +13,17 @@ from geomech.geometry.gait import checked_gait
 from geomech.scenes.model import Scene
 from geomech.studies import cost, tables, uncertainty
 from geomech.studies.elements import (
-    MOST,
-    elements_of,
-    gait_with,
+    MAX_ELEMENTS,
+    gait_with_elements,
     is_refinable,
+    n_elements,
     with_elements,
 )
 from geomech.studies.estimate import (
-    CHECKED,
-    FEWEST_STEPS,
-    against_direct,
-    in_groups,
+    MIN_STEPS,
+    N_COMPARED,
+    direct_with_error_parts,
+    errors_from_direct,
     pose_distance,
 )
 from geomech.studies.scene_tables import SceneTables
@@ -34,11 +34,11 @@ from geomech.tiers.direct import DIRECT
 from rft.core.checks import is_number, real_array
 from rft.core.refusal import Refusal
 
-MOST_PHASES = 1 << 16
-FINEST_PIECES = 640  # of body, for a tolerance
+MAX_PHASES = 1 << 16
+MAX_PIECES = 640  # of body, for a tolerance
 
 
-def cheapest(
+def cheapest_displacements(
     scene: Scene,
     amplitudes: Sequence[float],
     tol: float,
@@ -70,16 +70,16 @@ def cheapest(
             where=scene.name,
             instead="raise ``tolerance``",
         )
-    ask(cost.of_medium(scene, gait, len(amplitudes)))
-    medium = uncertainty.of_medium(scene, gait, amplitudes)
+    ask(cost.medium_jobs(scene, gait, len(amplitudes)))
+    medium = uncertainty.medium_spread(scene, gait, amplitudes)
 
     def answer(tier: str, poses, error, settings: dict) -> Result:
         took = {tier: time.perf_counter() - start}
-        more = tables.timings(took, ())
+        more = tables.timing_variables(took, ())
         for name, value in settings.items():
             label = "chosen for the tolerance"
             more.append(Variable(f"chosen_{name}", (), value, "1", label))
-        return tables.result(
+        return tables.displacement_result(
             scene,
             gait,
             amplitudes,
@@ -91,9 +91,9 @@ def cheapest(
         )
 
     sampled = np.unique(
-        np.linspace(0, len(amplitudes) - 1, min(CHECKED, 9)).round().astype(int)
+        np.linspace(0, len(amplitudes) - 1, min(N_COMPARED, 9)).round().astype(int)
     )
-    phases = max(FEWEST_STEPS if system.traits.steps else 32, 8 * gait.harmonics)
+    phases = max(MIN_STEPS if system.traits.steps else 32, 8 * gait.harmonics)
     plans = {
         m: plan
         for m in study.tiers
@@ -105,7 +105,7 @@ def cheapest(
         )
         phases = settings["phases"]
     balances = {
-        m: cost.balances(plan, len(amplitudes), phases) for m, plan in plans.items()
+        m: cost.n_balances(plan, len(amplitudes), phases) for m, plan in plans.items()
     }
     enough = len(amplitudes) * solved_phases(
         system, gait, phases
@@ -113,7 +113,7 @@ def cheapest(
     for tier in sorted(plans, key=balances.get):
         if balances[tier] >= enough:
             break
-        ask(cost.predicted(scene, plans[tier], len(amplitudes)))
+        ask(cost.prediction_jobs(scene, plans[tier], len(amplitudes)))
         try:
             checked = study.poses(tier, gait, amplitudes[sampled])
         except ValueError:  # the gait leaves the field or the family of this tier
@@ -123,7 +123,7 @@ def cheapest(
         ].max() <= tol:
             poses = study.poses(tier, gait, amplitudes)
             error, spread = (
-                against_direct(scene, poses, gait, amplitudes),
+                errors_from_direct(scene, poses, gait, amplitudes),
                 study.spread(tier, gait, amplitudes),
             )
             if spread is not None:
@@ -153,15 +153,15 @@ def _refined(
     cause the largest error, again and again, and {"phases": ..., "pieces": ..., "elements": ... if any}.
 
     Only amplitudes that need it are refined, until all positions are within ``tol`` or doubling no longer helps."""
-    ask(cost.direct(scene, gait, len(amplitudes), phases))
-    poses, *errors = in_groups(scene, gait, amplitudes, phases)
+    ask(cost.direct_jobs(scene, gait, len(amplitudes), phases))
+    poses, *errors = direct_with_error_parts(scene, gait, amplitudes, phases)
     shares = np.array(errors)  # of phases and rounding, of pieces, of elements
     counts = {
         "phases": phases,
         "pieces": getattr(solver_of(scene.system), "pieces", 0),
-        "elements": elements_of(scene.system),
+        "elements": n_elements(scene.system),
     }
-    most = {"phases": MOST_PHASES, "pieces": FINEST_PIECES, "elements": MOST}
+    most = {"phases": MAX_PHASES, "pieces": MAX_PIECES, "elements": MAX_ELEMENTS}
     if not is_refinable(scene.system):
         most["elements"] = 0
     open_ = np.arange(len(amplitudes))
@@ -174,8 +174,8 @@ def _refined(
             break
         counts[coarse] *= 2
         finer_scene, finer_gait = _finer(scene, gait, counts)
-        ask(cost.direct(finer_scene, finer_gait, len(worse), counts["phases"]))
-        finer, *finer_errors = in_groups(
+        ask(cost.direct_jobs(finer_scene, finer_gait, len(worse), counts["phases"]))
+        finer, *finer_errors = direct_with_error_parts(
             finer_scene, finer_gait, amplitudes[worse], counts["phases"]
         )
         finer_shares = np.array(finer_errors)
@@ -197,7 +197,7 @@ def _finer(scene: Scene, gait: Gait, counts: dict[str, int]) -> tuple[Scene, Gai
     if pieces_per_length(scene.system):
         scene = scene.with_numerics(pieces=counts["pieces"])
     count, system = counts["elements"], scene.system
-    if count == elements_of(system):
+    if count == n_elements(system):
         return scene, gait
-    gait = gait_with(gait, system, count)
+    gait = gait_with_elements(gait, system, count)
     return scene.changed(system=with_elements(system, count), gait=gait), gait

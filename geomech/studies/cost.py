@@ -19,7 +19,7 @@ from geomech.run.backend import prefer_backend
 from geomech.run.cost import BASE, Cost, assumed_seconds
 from geomech.scenes.model import Scene
 from geomech.studies import effort, estimate, uncertainty
-from geomech.studies.elements import coarser
+from geomech.studies.elements import coarser_systems
 from geomech.systems.base import System
 from geomech.systems.capabilities import (
     balance_size,
@@ -34,17 +34,19 @@ from geomech.systems.framed import Framed
 from geomech.tiers import fitted, harmonic
 from geomech.tiers.base import Plan, Table, solved_phases
 
-CLOSED = 1e-6  # s of a velocity without balance of forces, measured for built-in systems, assumed for others
-LOOK, READ = (
+SECONDS_PER_CLOSED_FORM = 1e-6  # s of a velocity without balance of forces, measured for built-in systems, assumed for others
+SECONDS_PER_LOOKUP, SECONDS_PER_NUMBER = (
     2.2e-7,
     1.1e-9,
 )  # s for each look-up in a table, and for each number that it sums; measured
-CYCLES = 3  # until they repeat, assumed
-COPIES = (
+ASSUMED_CYCLES = 3  # until they repeat, assumed
+CYCLE_COPIES = (
     14  # of the angles and velocities of a gait while they are solved and integrated
 )
-TABLES = 4  # of a table while it is built, interpolated and written
-ROW = 800  # bytes of an amplitude's results by all tiers, as lists and as text
+TABLE_COPIES = 4  # of a table while it is built, interpolated and written
+AMPLITUDE_BYTES = (
+    800  # bytes of an amplitude's results by all tiers, as lists and as text
+)
 
 
 class Job(NamedTuple):
@@ -61,7 +63,7 @@ class Job(NamedTuple):
     memory: float = BASE
 
 
-def price(jobs: Sequence[Job]) -> Cost:
+def total_cost(jobs: Sequence[Job]) -> Cost:
     """Return the cost of jobs that are done one after the other."""
     balances, seconds, besides = (
         math.ceil(sum(job.count for job in jobs)),
@@ -73,7 +75,7 @@ def price(jobs: Sequence[Job]) -> Cost:
         for job in jobs:
             system = job.scene.system
             if solver_of(system) is None:
-                besides += CLOSED * job.count
+                besides += SECONDS_PER_CLOSED_FORM * job.count
             else:
                 points = balance_size(system).evaluations
                 seconds += assumed_seconds(
@@ -88,7 +90,7 @@ def price(jobs: Sequence[Job]) -> Cost:
     )
 
 
-def study(
+def study_jobs(
     scene: Scene,
     plans: Mapping[str, Plan],
     count: int,
@@ -102,65 +104,76 @@ def study(
     for plan in sorted(plans.values(), key=lambda plan: -plan.numbers):
         if tables and plan.table and plan.table.name not in names:
             names.add(plan.table.name)
-            jobs += built(scene, plan.table, plan.numbers)
-    jobs += frame(scene) if tables and "connection" not in names else []
+            jobs += table_jobs(scene, plan.table, plan.numbers)
+    jobs += frame_jobs(scene) if tables and "connection" not in names else []
     guesses = [plan for plan in plans.values() if not plan.exact]
     for plan in guesses:
-        jobs += _looked_up(scene, plan, count, phases)
-    jobs += of_medium(scene, gait, count)
+        jobs += _lookup_jobs(scene, plan, count, phases)
+    jobs += medium_jobs(scene, gait, count)
     if len(guesses) < len(plans):
-        return jobs + (len(plans) - len(guesses)) * direct(scene, gait, count, phases)
+        return jobs + (len(plans) - len(guesses)) * direct_jobs(
+            scene, gait, count, phases
+        )
     fewer = max(estimate.REFERENCE_PHASES, 8 * gait.harmonics)
-    return jobs + len(guesses) * direct(
-        scene, gait, min(count, estimate.CHECKED), fewer
+    return jobs + len(guesses) * direct_jobs(
+        scene, gait, min(count, estimate.N_COMPARED), fewer
     )
 
 
-def predicted(scene: Scene, plan: Plan, count: int) -> list[Job]:
+def prediction_jobs(scene: Scene, plan: Plan, count: int) -> list[Job]:
     """Return the jobs of a prediction of ``count`` amplitudes by a tier, with its table."""
-    table = built(scene, plan.table, plan.numbers) if plan.table else []
-    return table + _looked_up(scene, plan, count, scene.numerics.phases)
+    table = table_jobs(scene, plan.table, plan.numbers) if plan.table else []
+    return table + _lookup_jobs(scene, plan, count, scene.numerics.phases)
 
 
-def balances(plan: Plan, count: int, phases: int) -> int:
+def n_balances(plan: Plan, count: int, phases: int) -> int:
     """Return the number of velocities for a prediction of ``count`` amplitudes at so many phases, with its table."""
     return (plan.table.balances if plan.table else 0) + plan.balances(count, phases)
 
 
-def _looked_up(scene: Scene, plan: Plan, count: int, phases: int) -> list[Job]:
+def _lookup_jobs(scene: Scene, plan: Plan, count: int, phases: int) -> list[Job]:
     """Return the jobs of a tier besides its table."""
     if plan.table:
-        return [Job(scene, 0, 0, besides=(LOOK + READ * plan.read) * count * phases)]
-    return _spread_out(scene, plan.balances(count, phases), BASE)
+        return [
+            Job(
+                scene,
+                0,
+                0,
+                besides=(SECONDS_PER_LOOKUP + SECONDS_PER_NUMBER * plan.read)
+                * count
+                * phases,
+            )
+        ]
+    return field_jobs(scene, plan.balances(count, phases), BASE)
 
 
-def _spread_out(scene: Scene, count: float, memory: float) -> list[Job]:
+def field_jobs(scene: Scene, count: float, memory: float) -> list[Job]:
     """Return the jobs of velocities at shapes all over the field."""
     return [Job(scene, count, -(-count // SAMPLES_TOGETHER), memory=memory)]
 
 
-def frame(scene: Scene) -> list[Job]:
+def frame_jobs(scene: Scene) -> list[Job]:
     """Return the jobs of the field that defines a frame, as "minimum-perturbation" has one."""
-    return connection(scene) if isinstance(scene.system, Framed) else []
+    return connection_jobs(scene) if isinstance(scene.system, Framed) else []
 
 
-def of_medium(
+def medium_jobs(
     scene: Scene, gait: Gait, count: int, together: int = sys.maxsize
 ) -> list[Job]:
-    """Return the jobs of an uncertain medium for ``count`` amplitudes (`uncertainty.of_medium`), at most ``together``
+    """Return the jobs of an uncertain medium for ``count`` amplitudes (`uncertainty.medium_spread`), at most ``together``
     in a batch."""
-    if not uncertainty.uncertain(scene.system):
+    if not uncertainty.is_uncertain(scene.system):
         return []
     phases, points = (
         max(uncertainty.PHASES, 8 * gait.harmonics),
-        uncertainty.points(scene.system),
+        uncertainty.n_systems(scene.system),
     )
-    return points * direct(scene, gait, count, phases, together, checked=False) + (
+    return points * direct_jobs(scene, gait, count, phases, together, checked=False) + (
         points - 1
-    ) * frame(scene)
+    ) * frame_jobs(scene)
 
 
-def direct(
+def direct_jobs(
     scene: Scene, gait: Gait, count: int, phases: int, together: int = sys.maxsize, checked: bool = True,
     all_phases: bool = False,
 ) -> list[Job]:  # fmt: skip
@@ -169,18 +182,18 @@ def direct(
     too."""
     system, stepping = scene.system, scene.system.traits.steps
     if checked:
-        phases = max(estimate.FEWEST_STEPS if stepping else 32, 8 * -(-phases // 8))
+        phases = max(estimate.MIN_STEPS if stepping else 32, 8 * -(-phases // 8))
     group = min(max(1, count), together, gaits_per_batch(system, phases))
     size = balance_size(system)
     stored = group * (60 * size.elements + size.memory) if stepping else 0
     memory = (
         BASE
-        + 8 * (COPIES * group * phases * (system.joints + 6) + stored)
-        + count * ROW
+        + 8 * (CYCLE_COPIES * group * phases * (system.joints + 6) + stored)
+        + count * AMPLITUDE_BYTES
     )
     solves = (lambda n: n) if all_phases else (lambda n: solved_phases(system, gait, n))
-    runs = _runs(scene, phases) if checked else [(phases, 1.0)]
-    groups, cycles = -(-count // group), cycles_of(system)
+    runs = _direct_runs(scene, phases) if checked else [(phases, 1.0)]
+    groups, cycles = -(-count // group), n_cycles(system)
     jobs = [
         Job(
             scene,
@@ -192,21 +205,23 @@ def direct(
         for n, weight in runs
     ]
     return jobs + (
-        frame(scene) * groups * (len(runs) - 1) if isinstance(system, Framed) else []
+        frame_jobs(scene) * groups * (len(runs) - 1)
+        if isinstance(system, Framed)
+        else []
     )  # other models have frames of their own
 
 
-def cycles_of(system: System) -> int:
+def n_cycles(system: System) -> int:
     """Return the number of cycles that a gait is run for: the setting, one where every cycle differs, else an
     assumption."""
     return (
-        CYCLES
+        ASSUMED_CYCLES
         if settling(system)
         else (system.traits.steps and solver_of(system).cycles) or 1
     )
 
 
-def _runs(scene: Scene, phases: int) -> list[tuple[int, float]]:
+def _direct_runs(scene: Scene, phases: int) -> list[tuple[int, float]]:
     """Return (phases, weight of a balance) of the runs of `estimate.direct`: time stepping again at a half, a quarter and an
     eighth of the phases, a quarter with a finer model where there is one, with half and a quarter of the elements of a
     continuous body likewise, and where effects cut the body, twice as many pieces at a quarter of the phases, and half and
@@ -219,30 +234,30 @@ def _runs(scene: Scene, phases: int) -> list[tuple[int, float]]:
         if pieces_per_length(system)
         else []
     )
-    runs += [(quarter, 1.0 / other.ratio) for other in coarser(system)]
+    runs += [(quarter, 1.0 / other.ratio) for other in coarser_systems(system)]
     return runs + ([(quarter, 1.0)] if refined(system) else [])
 
 
-def connection(scene: Scene) -> list[Job]:
+def connection_jobs(scene: Scene) -> list[Job]:
     """Return the jobs of the connection with its CCF."""
-    return built(scene, fitted.table(scene.system, scene.numerics))
+    return table_jobs(scene, fitted.table(scene.system, scene.numerics))
 
 
-def harmonics(scene: Scene) -> list[Job]:
+def harmonic_jobs(scene: Scene) -> list[Job]:
     """Return the jobs of the harmonics of the velocity."""
-    return built(scene, harmonic.table(scene.system, scene.numerics))
+    return table_jobs(scene, harmonic.table(scene.system, scene.numerics))
 
 
-def built(scene: Scene, table: Table, numbers: int = 0) -> list[Job]:
+def table_jobs(scene: Scene, table: Table, numbers: int = 0) -> list[Job]:
     """Return the jobs of a table. numbers: stored besides."""
     if table.axes:
         table.axes()  # refuses a field that is too large
-    return _spread_out(
-        scene, table.balances, BASE + 8 * TABLES * (table.numbers + numbers)
+    return field_jobs(
+        scene, table.balances, BASE + 8 * TABLE_COPIES * (table.numbers + numbers)
     )
 
 
-def of_even_part(scene: Scene) -> list[Job]:
+def even_part_jobs(scene: Scene) -> list[Job]:
     """Return the jobs of the even part of the velocity (`SceneTables.even_part`): at a few shapes, and at all where it is not
     odd."""
     system = scene.system
@@ -250,14 +265,14 @@ def of_even_part(scene: Scene) -> list[Job]:
         return []
     shapes = math.prod(len(a) for a in fitted.axes(system, scene.numerics))
     looked_at = EVEN_SHAPES + (0 if system.traits.odd else shapes)
-    return _spread_out(
+    return field_jobs(
         scene,
         2 * looked_at * EVEN_DIRECTIONS * system.joints,
-        BASE + 8 * TABLES * 3 * shapes,
+        BASE + 8 * TABLE_COPIES * 3 * shapes,
     )
 
 
-def of_planes(
+def plane_jobs(
     scene: Scene, pairs: Sequence[tuple[int, int]], at: Sequence
 ) -> list[Job]:
     """Return the jobs of planes of pairs of joints through shapes (`SceneTables.plane`)."""
@@ -265,16 +280,16 @@ def of_planes(
         fitted.plane_balances(scene.system, scene.numerics, *one)
         for one in zip(pairs, at)
     ]
-    return [job for count in balances for job in _spread_out(scene, count, BASE)]
+    return [job for count in balances for job in field_jobs(scene, count, BASE)]
 
 
-def of_metric(scene: Scene) -> list[Job]:
+def metric_jobs(scene: Scene) -> list[Job]:
     """Return the jobs of the metric, with the harmonic table where they share velocities (`SceneTables.compute_metric`)."""
     system, n = scene.system, scene.numerics
     if stored_table(system, "metric"):
         return []
-    if effort.shared(system):
-        return built(scene, effort.shared_table(system, n))
+    if effort.shares_velocities(system):
+        return table_jobs(scene, effort.shared_table(system, n))
     rates = (
         system.joints * (system.joints + 1) // 2
         if system.traits.linear
@@ -282,21 +297,21 @@ def of_metric(scene: Scene) -> list[Job]:
     )
     count, numbers = (
         np.prod([len(a) for a in fitted.axes(system, n)]),
-        max(system.joints**2, effort.HIGHEST + 1),
+        max(system.joints**2, effort.HIGHEST_HARMONIC + 1),
     )
-    return _spread_out(
-        scene, float(count * rates), BASE + 8 * TABLES * float(count * numbers)
+    return field_jobs(
+        scene, float(count * rates), BASE + 8 * TABLE_COPIES * float(count * numbers)
     )
 
 
-def of_effort(scene: Scene, count: int, gait: Gait | None = None) -> list[Job]:
+def effort_jobs(scene: Scene, count: int, gait: Gait | None = None) -> list[Job]:
     """Return the jobs of path length and work of ``count`` amplitudes (`effort.effort`): for time stepping again at
     half and a quarter of the phases, and at a quarter with twice the pieces, or fewer elements of a continuous body."""
-    phases, system = effort.phases_of(scene), scene.system
-    once = lambda n: direct(scene, gait or scene.gait, count, n, checked=False)
+    phases, system = effort.effort_phases(scene), scene.system
+    once = lambda n: direct_jobs(scene, gait or scene.gait, count, n, checked=False)
     jobs = once(phases)
     jobs += once(phases // 2) + once(phases // 4) if system.traits.steps else []
-    weights = [1.0 / other.ratio for other in coarser(system)]
+    weights = [1.0 / other.ratio for other in coarser_systems(system)]
     weights += [2.0] if pieces_per_length(system) else []
     return jobs + [
         job._replace(weight=weight) for weight in weights for job in once(phases // 4)

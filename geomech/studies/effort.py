@@ -24,8 +24,8 @@ from geomech.geometry.harmonics import Harmonics
 from geomech.geometry.metric import Finsler, Metric
 from geomech.scenes.model import Scene
 from geomech.studies import tables
-from geomech.studies.elements import change, elements_of
-from geomech.studies.estimate import MOST_PIECES
+from geomech.studies.elements import error_by_elements, n_elements
+from geomech.studies.estimate import MAX_PIECES
 from geomech.systems.base import System, body_size, kind_of
 from geomech.systems.capabilities import (
     Dissipative,
@@ -47,17 +47,17 @@ from rft.core.premise import ALL, SHAPE_ALONE
 from rft.core.refusal import Refusal
 
 DEPENDS_ON = ("grid", "extent", "interpolation")  # of [numerics]
-HIGHEST = (
+HIGHEST_HARMONIC = (
     14  # harmonic of a norm that the 24 directions of the harmonic table resolve well
 )
-METRIC = "own metric"  # unit of path lengths by the metric of the system itself
-WORK = (
+METRIC_UNIT = "own metric"  # unit of path lengths by the metric of the system itself
+WORK_UNIT = (
     "drag x BL"  # the axial drag of the whole body, in a fluid at 1 BL per rad of phase
 )
-EVEN = 1e-6  # of the power: above a solver's tolerance
+EVEN_TOLERANCE = 1e-6  # of the power: above a solver's tolerance
 
 
-def why_none(system: System) -> str:
+def why_no_metric(system: System) -> str:
     """Return why a system has no metric, in words that follow its name; "" if it has one."""
     if parts := because(system, SHAPE_ALONE):
         return f"no metric with {parts}: its power does not follow from shape alone"
@@ -77,7 +77,7 @@ def why_none(system: System) -> str:
         return f"no metric of {system.joints} joints where power is not quadratic: its norm is told for two"
     return (
         ""
-        if _even(system)
+        if _is_even(system)
         else f"no metric with {_responsible_parts(system)}: one way costs another power than the way back"
     )
 
@@ -93,7 +93,7 @@ def _responsible_parts(system: System) -> str:
 
 
 @lru_cache(maxsize=16)
-def _even(system: System) -> bool:
+def _is_even(system: System) -> bool:
     """Return whether power is equal for alphadot and -alphadot, tested at a few shapes."""
     if system.traits.linear:
         return True
@@ -103,14 +103,14 @@ def _even(system: System) -> bool:
         connection.directions(2, 8),
     )
     forth, back = (power(system, alpha, sign * alphadot) for sign in (1, -1))
-    return bool(np.abs(forth - back).max() <= EVEN * np.abs(forth).max())
+    return bool(np.abs(forth - back).max() <= EVEN_TOLERANCE * np.abs(forth).max())
 
 
-def table(
+def fit_metric(
     system: System, numerics: Numerics, progress: Callable | None = None
 ) -> Metric | Finsler:
     """Return the metric on the field's grid: quadratic where xi = A alphadot, else a norm. Refusal if there is none."""
-    if reason := why_none(system):
+    if reason := why_no_metric(system):
         raise Refusal(reason)
     if own := stored_table(system, "metric"):
         return own
@@ -120,12 +120,14 @@ def table(
         return metric.fit(
             own.squared_speed if own else partial(power, system), grid, degree, progress
         )
-    norm = partial(_norm_of, system)
+    norm = partial(_norm_at, system)
     count = harmonic.directions(system, numerics)
-    return metric.fit_norm(norm, grid, count, degree, progress, highest=HIGHEST)
+    return metric.fit_norm(
+        norm, grid, count, degree, progress, highest=HIGHEST_HARMONIC
+    )
 
 
-def shared(system: System) -> bool:
+def shares_velocities(system: System) -> bool:
     """Return whether the metric can be computed from the velocities of the harmonic table."""
     of_its_own = (
         system.traits.linear
@@ -137,16 +139,16 @@ def shared(system: System) -> bool:
 
 def shared_table(system: System, numerics: Numerics) -> Table:
     """Return the harmonic table as it is built with the metric."""
-    return harmonic.table(_Watched(system), numerics)
+    return harmonic.table(_PowerRecorder(system), numerics)
 
 
-def with_harmonics(
+def fit_with_harmonics(
     system: System, numerics: Numerics, progress: Callable | None = None
 ) -> tuple[Harmonics, Metric | Finsler]:
     """Return the harmonic table and the metric from the same force balances. Refusal if there is no metric."""
-    if reason := why_none(system):
+    if reason := why_no_metric(system):
         raise Refusal(reason)
-    watched = _Watched(system)
+    watched = _PowerRecorder(system)
     harmonics = harmonic.table(watched, numerics).build(progress)
     P, size = np.concatenate(watched.powers), np.prod([len(a) for a in harmonics.axes])
     P = np.concatenate(
@@ -155,11 +157,11 @@ def with_harmonics(
     F = _norm(P, system.traits.power_degree).T.reshape(-1, *map(len, harmonics.axes))
     unit = connection.directions(2, len(F))
     return harmonics, metric.norm_from_samples(
-        F, harmonics.axes, unit, harmonics.degree, highest=HIGHEST
+        F, harmonics.axes, unit, harmonics.degree, highest=HIGHEST_HARMONIC
     )
 
 
-class _Watched:
+class _PowerRecorder:
     """A system that records powers whenever its velocities are computed, shape after shape on half of the grid."""
 
     def __init__(self, system: System):
@@ -170,11 +172,11 @@ class _Watched:
         return getattr(self.system, name)
 
     @property
-    def velocity(self) -> _Driven:
-        return _Driven(self.system, self.powers)
+    def velocity(self) -> _RecordedVelocity:
+        return _RecordedVelocity(self.system, self.powers)
 
 
-class _Driven(connection.Reporting):
+class _RecordedVelocity(connection.Reporting):
     """The velocity of a system, which also passes on the power."""
 
     def __init__(self, system: System, powers: list):
@@ -184,10 +186,10 @@ class _Driven(connection.Reporting):
         )
 
     def __reduce__(self) -> tuple:
-        return _Driven, (self.with_report.args[0], [])
+        return _RecordedVelocity, (self.with_report.args[0], [])
 
 
-def _norm_of(system: System, alpha, alphadot) -> np.ndarray:
+def _norm_at(system: System, alpha, alphadot) -> np.ndarray:
     return _norm(power(system, alpha, alphadot), system.traits.power_degree)
 
 
@@ -227,10 +229,10 @@ def effort(
         "amplitudes", [gait.amplitude] if amplitudes is None else amplitudes
     ).ravel()
     in_range("phases", phases or 8, 8, 1e6, whole=True)
-    phases = phases_of(scene, phases)
+    phases = effort_phases(scene, phases)
     finer = (
         scene.with_numerics(
-            pieces=min(2 * pieces_per_length(system), MOST_PIECES)
+            pieces=min(2 * pieces_per_length(system), MAX_PIECES)
         ).system
         if pieces_per_length(system)
         else None
@@ -253,8 +255,8 @@ def effort(
             error = np.abs(fine - half)
         if finer:
             error += 2 * np.abs(integral(_rates(finer, *fewer[1])) - quarter)
-        if elements_of(system):
-            error += change_by_elements(system, *fewer[1], quarter)
+        if n_elements(system):
+            error += effort_error_by_elements(system, *fewer[1], quarter)
         return np.concatenate([fine, error], 1)
 
     names = ("path_length", "work", "path_length_error", "work_error")
@@ -266,7 +268,7 @@ def effort(
     )
 
 
-def change_by_elements(
+def effort_error_by_elements(
     system: System, alpha, alphadot, values: np.ndarray
 ) -> np.ndarray:
     """Return the errors (B, 2) of path length and work, ``values``, that the elements of a continuous body cause."""
@@ -277,10 +279,10 @@ def change_by_elements(
     def apart(a, b):
         return np.abs(a - b)
 
-    return change(system, alpha, alphadot, values, integrals, apart)
+    return error_by_elements(system, alpha, alphadot, values, integrals, apart)
 
 
-def phases_of(scene: Scene, phases: int | None = None) -> int:
+def effort_phases(scene: Scene, phases: int | None = None) -> int:
     """Return the number of phases of `effort`, rounded up, from the number given or the scene's own."""
     return max(
         32 if scene.system.traits.steps else 8,
@@ -337,7 +339,7 @@ def with_effort(result: Result, scene: Scene, gait: Gait | None = None) -> Resul
         for key in ("path_length", "work")
     ]
     extra += [
-        Variable(key, tables.OVER, x, unit.get(key, "")) for key, x in ratios.items()
+        Variable(key, tables.DIMS, x, unit.get(key, "")) for key, x in ratios.items()
     ]
     return replace(result, variables=(*result.variables, *extra))
 
@@ -345,10 +347,10 @@ def with_effort(result: Result, scene: Scene, gait: Gait | None = None) -> Resul
 def units(system: System) -> dict[str, str]:
     """Return the units of the variables that `with_effort` adds."""
     if capability(system, OwnMetric) is not None:
-        return {"path_length": METRIC, "efficiency": f"BL / {METRIC}"}
+        return {"path_length": METRIC_UNIT, "efficiency": f"BL / {METRIC_UNIT}"}
     return {
         "path_length": "BL",
-        "work": WORK,
+        "work": WORK_UNIT,
         "efficiency": "BL/BL",
         "cost_of_transport": "1",
     }

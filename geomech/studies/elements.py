@@ -18,8 +18,8 @@ from geomech.systems.base import System
 from geomech.systems.framed import Framed
 from rft.formulas import se2
 
-MOST = 2000  # elements of a body
-FEWEST = 3
+MAX_ELEMENTS = 2000  # elements of a body
+MIN_ELEMENTS = 3
 # Times the error by theory. In a sample of serpenoids, arcs and sines in fluid and sand,
 # of 8 elements and more a wave, it covers the change to 800 elements; the median
 # estimate is 2.6 times that.
@@ -27,23 +27,23 @@ SAFETY = 2.5
 SLOWEST = 0.5  # factor of the error from halving elements; by theory 1/4
 
 
-def body_of(system: System) -> Any:
+def continuous_body(system: System) -> Any:
     """Return the continuous body of a system; None without one."""
     swimmer = system.inner if isinstance(system, Framed) else system
     body = getattr(swimmer, "body", None)
     return body if getattr(body, "elements", None) else None
 
 
-def elements_of(system: System) -> int:
+def n_elements(system: System) -> int:
     """Return the elements of a continuous body; 0 of other systems."""
-    body = body_of(system)
+    body = continuous_body(system)
     return body.elements if body else 0
 
 
 def is_refinable(system: System) -> bool:
     """Return whether a continuous body can have more elements and keep its frame, which is
     not that of one of them."""
-    body = body_of(system)
+    body = continuous_body(system)
     if body is None or getattr(body, "lengths", None) is not None:
         return False  # splines through given links tell no more than the links
     return isinstance(system, Framed) or body.frame == "mean"
@@ -52,14 +52,14 @@ def is_refinable(system: System) -> bool:
 def with_elements(system: System, count: int) -> System:
     """Return the system with its continuous body made of ``count`` elements; ValueError if
     there is no such body."""
-    body = body_of(system).with_elements(count)
+    body = continuous_body(system).with_elements(count)
     if isinstance(system, Framed):
         return replace(system, inner=replace(system.inner, body=body))
     return replace(system, body=body)
 
 
 @dataclass(frozen=True)
-class Resampled:
+class ResampledGait:
     """The gait of a continuous body, for the same body of ``count`` elements."""
 
     gait: Any
@@ -87,48 +87,50 @@ class Resampled:
         return tuple(self.body.resampled(x, self.count) for x in shapes)
 
 
-def gait_with(gait: Gait, system: System, count: int) -> Any:
+def gait_with_elements(gait: Gait, system: System, count: int) -> Any:
     """Return the gait of a system for its body of ``count`` elements."""
     if system.joints == with_elements(system, count).joints:
         return gait
     if (method := getattr(gait, "with_elements", None)) is not None:
         return method(count)
-    return Resampled(gait, body_of(system), count)
+    return ResampledGait(gait, continuous_body(system), count)
 
 
-class Coarser(NamedTuple):
+class CoarserSystem(NamedTuple):
     """A system of fewer elements. ratio: of the elements to those of the finer one."""
 
     system: System
     ratio: float
 
 
-def coarser(system: System) -> list[Coarser]:
+def coarser_systems(system: System) -> list[CoarserSystem]:
     """Return the system with half and a quarter of its elements, or about as many where the
     body takes other numbers only; none of these that there are not. A body that cannot have
     half is returned with twice its elements, whose ratio is below 1."""
-    count = elements_of(system)
+    count = n_elements(system)
     if not count:
         return []
-    found: list[Coarser] = []
+    found: list[CoarserSystem] = []
     finer = count
-    while len(found) < 2 and (fewer := _fewer(system, finer // 2, -(-finer // 3))):
-        found.append(Coarser(with_elements(system, fewer), count / fewer))
+    while len(found) < 2 and (
+        fewer := _largest_number(system, finer // 2, -(-finer // 3))
+    ):
+        found.append(CoarserSystem(with_elements(system, fewer), count / fewer))
         finer = fewer
-    if found or 2 * count > MOST or not _exists(system, 2 * count):
+    if found or 2 * count > MAX_ELEMENTS or not _can_have(system, 2 * count):
         return found
-    return [Coarser(with_elements(system, 2 * count), 0.5)]
+    return [CoarserSystem(with_elements(system, 2 * count), 0.5)]
 
 
-def _fewer(system: System, most: int, least: int) -> int | None:
+def _largest_number(system: System, most: int, least: int) -> int | None:
     """Return the largest number of elements within limits that the body takes."""
-    for count in range(most, max(least, FEWEST) - 1, -1):
-        if _exists(system, count):
+    for count in range(most, max(least, MIN_ELEMENTS) - 1, -1):
+        if _can_have(system, count):
             return count
     return None
 
 
-def _exists(system: System, count: int) -> bool:
+def _can_have(system: System, count: int) -> bool:
     try:
         with_elements(system, count)
     except ValueError:  # such as arcs that do not divide the elements
@@ -136,7 +138,7 @@ def _exists(system: System, count: int) -> bool:
     return True
 
 
-def change(
+def error_by_elements(
     system: System, alpha, alphadot, values: np.ndarray, run: Callable, apart: Callable
 ) -> np.ndarray:
     """Return the error of ``values`` that the elements cause, from runs with fewer.
@@ -144,12 +146,12 @@ def change(
     alpha, alphadot: (..., N, d), shapes and rates. values: run(system, alpha, alphadot).
     run: function of a system of other elements, and of the shapes as they are for it.
     apart: function of two such values that returns their distances, >= 0."""
-    body = body_of(system)
+    body = continuous_body(system)
     changes: list[np.ndarray] = []
     ratios = [1.0]
     previous = values
-    for other, ratio in coarser(system):
-        count = elements_of(other)
+    for other, ratio in coarser_systems(system):
+        count = n_elements(other)
         shapes = (body.resampled(x, count) for x in (alpha, alphadot))
         result = run(other, *shapes)
         changes.append(apart(previous, result))
@@ -157,10 +159,10 @@ def change(
         previous = result
     if not changes:
         return 0.0 * apart(values, values)
-    return error(changes, ratios)
+    return error_of_finest(changes, ratios)
 
 
-def error(changes: list[np.ndarray], ratios: list[float]) -> np.ndarray:
+def error_of_finest(changes: list[np.ndarray], ratios: list[float]) -> np.ndarray:
     """Return the error of the finest of some results from the changes between neighbours.
 
     ratios: of elements of the finest to those of each, 1 first. By theory the error is of
@@ -188,7 +190,7 @@ def mean_poses(system: System, net: np.ndarray, alpha: np.ndarray) -> np.ndarray
     """Return net poses (..., 3) in the frame "mean" of a continuous body, from those in the
     frame of one of its elements, which lies elsewhere with fewer. alpha: (..., d), shape at
     the start."""
-    body = body_of(system)
+    body = continuous_body(system)
     if body is None or isinstance(system, Framed) or body.frame == "mean":
         return net
     h, _ = body.frame_pose("mean", alpha, 0.0 * alpha)

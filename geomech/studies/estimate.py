@@ -30,12 +30,12 @@ from geomech.systems.capabilities import (
 from rft.core.premise import Premise
 from rft.core.refusal import located
 
-CHECKED = 33  # amplitudes at which a look-up tier is compared with the direct one; between them the worse neighbour counts
-FEWEST_STEPS = (
+N_COMPARED = 33  # amplitudes at which a look-up tier is compared with the direct one; between them the worse neighbour counts
+MIN_STEPS = (
     64  # of time stepping that is refined: an eighth of them still resolves a gait
 )
 REFERENCE_PHASES = 64  # of that comparison without the direct tier in the request
-MOST_PIECES = 10_000  # per body length
+MAX_PIECES = 10_000  # per body length
 SAFETY = 2.5  # covers the truth in more than 95 % of random scenes while the median estimate stays below ten errors
 STICKING = (
     0.25  # factor of the error of links that stick from twice the phases, by theory
@@ -44,8 +44,10 @@ STICKING = (
 # and scatter so that single changes are small by chance. 180 headings and positions of random circles of 32 masses, in three
 # dry media, are covered with it; with 0.25 headings were wrong by up to six times the estimate.
 STICK_SLIP = 0.45
-SEEN = 1.2  # times the difference from smaller regularisation and exact integrals, which is nearly all of the error
-SEEN_BY_RULES = 3.5  # likewise between two rules, of order 1 in dry media; at least half of the larger of both, as they scatter
+FACTOR_TO_EXACT = 1.2  # times the difference from smaller regularisation and exact integrals, which is nearly all of the error
+# likewise between two rules, of order 1 in dry media; at least half of the larger of
+# both, as they scatter
+FACTOR_BETWEEN_RULES = 3.5
 ROUNDING = 2e-16  # of a velocity
 
 
@@ -66,11 +68,11 @@ def direct(
 
     phases is rounded up to a multiple of 8, >= 32. Many amplitudes are computed in groups, so that memory is bounded.
     """
-    poses, *errors = in_groups(scene, gait, amplitudes, phases)
+    poses, *errors = direct_with_error_parts(scene, gait, amplitudes, phases)
     return poses, sum(errors)
 
 
-def in_groups(
+def direct_with_error_parts(
     scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int
 ) -> tuple[np.ndarray, ...]:
     """Return poses, errors without those of the pieces and the elements of the body, and errors of either, of the direct
@@ -82,7 +84,9 @@ def in_groups(
         else [amplitudes[k : k + size] for k in range(0, max(1, len(amplitudes)), size)]
     )
     compute = (
-        _direct if scene.system.traits.steps else partial(runner().call, _direct)
+        _direct_group
+        if scene.system.traits.steps
+        else partial(runner().call, _direct_group)
     )  # time stepping stores its own checkpoints
     with located(scene.name):
         return tuple(
@@ -91,18 +95,18 @@ def in_groups(
         )
 
 
-def _direct(
+def _direct_group(
     scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int
 ) -> tuple[np.ndarray, ...]:
-    """Return what `in_groups` does, of one group."""
+    """Return what `direct_with_error_parts` does, of one group."""
     phases = max(32, 8 * -(-phases // 8))
     system, stepping = scene.system, scene.system.traits.steps
-    shapes = gait.cycle(max(FEWEST_STEPS, phases) if stepping else phases, amplitudes)
+    shapes = gait.cycle(max(MIN_STEPS, phases) if stepping else phases, amplitudes)
     strided = [tuple(x[..., ::step, :] for x in shapes) for step in (8, 4, 2, 1)]
     run = system.run(*shapes)
     if stepping:  # each step depends on the one before: fewer phases are other steps
         eighth, coarse, half, full = (
-            *(_with_fewer(system, *fewer) for fewer in strided[:3]),
+            *(_coarse_poses(system, *fewer) for fewer in strided[:3]),
             run.net,
         )
     else:
@@ -110,7 +114,7 @@ def _direct(
             displacement(run.xi[..., ::step, :]) for step in (8, 4, 2)
         )
         full = run.net
-    error = _remaining(
+    error = _remaining_error(
         *(
             pose_distance(*pair, body_size(scene.system))
             for pair in ((coarse, eighth), (half, coarse), (full, half))
@@ -125,9 +129,9 @@ def _direct(
             body_size(scene.system),
         )
         error += (
-            SEEN * difference
+            FACTOR_TO_EXACT * difference
             if is_closed(system)
-            else SEEN_BY_RULES
+            else FACTOR_BETWEEN_RULES
             * np.maximum(difference, difference.max(-1, keepdims=True) / 2)
         )
     error += np.asarray(run.to_come)[..., None] + table_error(system, *strided[2])
@@ -135,7 +139,7 @@ def _direct(
     return full, error, pieces, elements_error(system, strided[1], coarse)
 
 
-def _with_fewer(system, alpha, alphadot) -> np.ndarray:
+def _coarse_poses(system, alpha, alphadot) -> np.ndarray:
     """Return poses by fewer time steps than the request has; a RuntimeError says so."""
     try:
         return system.run(alpha, alphadot).net
@@ -153,15 +157,15 @@ def elements_error(system, fewer, coarse: np.ndarray) -> np.ndarray:
 
     def net(other, *shapes):
         poses = (
-            _with_fewer(other, *shapes)
+            _coarse_poses(other, *shapes)
             if system.traits.steps
             else other.run(*shapes).net
         )
         return elements.mean_poses(other, poses, shapes[0][..., 0, :])
 
-    if not elements.elements_of(system):
+    if not elements.n_elements(system):
         return np.zeros((*coarse.shape[:-1], 2))
-    return elements.change(
+    return elements.error_by_elements(
         system,
         alpha,
         alphadot,
@@ -182,7 +186,7 @@ def pieces_error(scene: Scene, shapes, fewer, coarse: np.ndarray) -> np.ndarray:
     if not cut:
         return np.zeros((*coarse.shape[:-1], 2))
     net = lambda n, cycle: (
-        scene.with_numerics(pieces=min(max(1, n), MOST_PIECES)).system.run(*cycle).net
+        scene.with_numerics(pieces=min(max(1, n), MAX_PIECES)).system.run(*cycle).net
     )
     length = body_size(scene.system)
     doubled = pose_distance(net(2 * cut, fewer), coarse, length)
@@ -198,7 +202,7 @@ def _slowest_gain(system) -> float:
     return STICK_SLIP if heavy and not system.traits.smooth else STICKING
 
 
-def _remaining(d0, d1, d2, least: float) -> np.ndarray:
+def _remaining_error(d0, d1, d2, least: float) -> np.ndarray:
     """Return the error after the last of three doublings of the phases, which changed the answer by d0, d1 and d2.
 
     If each doubling multiplies the error by r, the error after the last is d2 r / (1 - r), and r is estimated from the
@@ -210,14 +214,14 @@ def _remaining(d0, d1, d2, least: float) -> np.ndarray:
     return SAFETY * move * r / (1.0 - r)
 
 
-def against_direct(
+def errors_from_direct(
     scene: Scene, poses, gait: Gait, amplitudes: np.ndarray, reference=None
 ) -> np.ndarray:
     """Return errors (B, 2), as in `direct`, of poses (B, 3) by any other tier. reference: (poses, errors) of the direct
     tier at the same amplitudes; computed at some of them if None."""
     if reference is None:
         checked = np.unique(
-            np.linspace(0, len(amplitudes) - 1, CHECKED).round().astype(int)
+            np.linspace(0, len(amplitudes) - 1, N_COMPARED).round().astype(int)
         )
         reference = direct(
             scene, gait, amplitudes[checked], max(REFERENCE_PHASES, 8 * gait.harmonics)

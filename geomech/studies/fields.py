@@ -182,7 +182,7 @@ def has_matrix(system: System) -> bool:
     stored = stored_table(system, "metric")
     if stored:
         return isinstance(stored, Metric)
-    return not effort.why_none(system) and effort.is_quadratic(system)
+    return not effort.why_no_metric(system) and effort.is_quadratic(system)
 
 
 # Attributes.
@@ -205,7 +205,7 @@ def attributes(study: SceneTables) -> dict:
         "interpolation": int(study.fitted.degree),
     }
     degree = system.traits.power_degree
-    if degree is not None and not effort.why_none(system):
+    if degree is not None and not effort.why_no_metric(system):
         facts["power_degree"] = degree
     return facts
 
@@ -295,7 +295,7 @@ def variables(study: SceneTables) -> list[Variable]:
     if isinstance(system, Framed):
         found.append(frame_variable(system.field.field))
     # The metric before the harmonics, as they may share velocities.
-    if not effort.why_none(system):
+    if not effort.why_no_metric(system):
         of_drag = capability(system, OwnMetric) is None
         found += metric_variables(study.metric, of_drag)
     harmonics = study.harmonics
@@ -545,7 +545,7 @@ def metric_variables(metric: Metric | Finsler, of_drag: bool = True) -> list[Var
             units = "axial drag at 1 body length per time x body length x time rad-2"
             label = f"dissipation metric M, power = alphadot . M alphadot; {scale}"
         else:
-            units = effort.METRIC
+            units = effort.METRIC_UNIT
             label = (
                 "metric M of the system itself: alphadot . M alphadot is what it costs "
                 "to change shape"

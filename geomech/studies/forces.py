@@ -19,8 +19,8 @@ from geomech.core.variables import Result, Variable
 from geomech.geometry.reconstruct import poses
 from geomech.run.cost import Cost
 from geomech.scenes.model import Scene
-from geomech.studies.cost import direct, price
-from geomech.studies.elements import coarser, elements_of, gait_with
+from geomech.studies.cost import direct_jobs, total_cost
+from geomech.studies.elements import coarser_systems, gait_with_elements, n_elements
 from geomech.studies.newtons import ForceUnit, Sizes, force_unit
 from geomech.studies.undulation import activation_of_bends, bends, loaded
 from geomech.systems.base import body_size, length_unit
@@ -65,8 +65,8 @@ def cost(scene: Scene) -> Cost:
     jobs = []
     for one in (scene, *_variants(scene)):
         phases = one.numerics.phases
-        jobs += direct(_subdivided(one), one.gait, 1, phases, checked=False)
-    return price(jobs)
+        jobs += direct_jobs(_subdivided(one), one.gait, 1, phases, checked=False)
+    return total_cost(jobs)
 
 
 def answer(scene: Scene, sizes: Sizes) -> Result:
@@ -274,10 +274,10 @@ def _with_fewer_elements(scene: Scene) -> list[Scene]:
     """Return the scene of a continuous body, and of its gait, with about half as many
     elements; none for other bodies, or where it has too few."""
     system = scene.system
-    other = next(iter(coarser(system)), None)
+    other = next(iter(coarser_systems(system)), None)
     if other is None or other.ratio < 1:
         return []
-    gait = gait_with(scene.gait, system, elements_of(other.system))
+    gait = gait_with_elements(scene.gait, system, n_elements(other.system))
     return [scene.changed(system=other.system, gait=gait)]
 
 

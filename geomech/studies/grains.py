@@ -45,14 +45,16 @@ class GrainSteps(Cost):
         seconds = duration(self.seconds)
         return f"{self.balances:.1e} steps of grains, about {seconds} of computing"
 
-    def check(self, place: str, yes: bool, less: str = "ask for less") -> None:
+    def check(
+        self, place: str, yes: bool, cheaper_alternative: str = "ask for less"
+    ) -> None:
         if yes or self.seconds <= LONGEST:
             return
         longest = duration(LONGEST)
         raise TooLong(
             str(self),
             where=place,
-            instead=f"to compute for more than {longest} say ``yes``, or {less}",
+            instead=f"to compute for more than {longest} say ``yes``, or {cheaper_alternative}",
         )
 
 

@@ -15,8 +15,8 @@ from geomech.scenes.read import from_tables
 from rft.core.checks import real_array
 from rft.core.refusal import Refusal
 
-LARGEST = 100_000_000  # points
-MOST = (
+MAX_POINTS = 100_000_000  # points
+MAX_TESTED_VALUES = (
     200  # values of a parameter for which a scene is built as a test, some 0.5 ms each
 )
 
@@ -71,19 +71,24 @@ class Grid:
         )
 
     @cached_property
-    def at(self) -> At:
-        return At(dict(self.tables), self.scene, tuple(self.names))
+    def scene_factory(self) -> SceneFactory:
+        return SceneFactory(dict(self.tables), self.scene, tuple(self.names))
 
     def corners(self) -> Iterator[tuple[float, ...]]:
-        """Yield the corners, and the values of each parameter with the others at their first: all, or of more than `MOST`
-        some, with the least and the largest."""
+        """Yield the corners, and the values of each parameter with the others at their
+        first: all, or of more than `MAX_TESTED_VALUES` some, with the least and the
+        largest."""
         outer = [self.over[name] for name in self.names if name != self.inner]
         yield from itertools.product(*([v[0], v[-1]] for v in outer))
         for k, values in enumerate(outer):
             tested = (
                 values
-                if len(values) <= MOST
-                else [min(values), max(values), *values[:: -(-len(values) // MOST)]]
+                if len(values) <= MAX_TESTED_VALUES
+                else [
+                    min(values),
+                    max(values),
+                    *values[:: -(-len(values) // MAX_TESTED_VALUES)],
+                ]
             )
             yield from (
                 (*(v[0] for v in outer[:k]), x, *(v[0] for v in outer[k + 1 :]))
@@ -101,21 +106,21 @@ class Grid:
         return np.transpose(flat, (*(names.index(k) for k in self.over), len(names)))
 
 
-def listed(over: Mapping[str, Any]) -> dict[str, list[float]]:
+def checked_grid_values(over: Mapping[str, Any]) -> dict[str, list[float]]:
     """Return the values by parameter; Refusal unless they form a grid."""
     if not (isinstance(over, Mapping) and all(isinstance(k, str) for k in over)):
         raise Refusal(
             "over must be values by parameter, such as {'gait.amplitude': [0.5, 1.0]}",
             value=over,
         )
-    values = {name: _listed(name, x) for name, x in over.items()}
+    values = {name: _checked_list(name, x) for name, x in over.items()}
     total = math.prod(map(len, values.values())) if values else 0
-    if not 0 < total <= LARGEST:
-        raise Refusal(f"``over`` must span 1 to {LARGEST:,} points, got {total:,}")
+    if not 0 < total <= MAX_POINTS:
+        raise Refusal(f"``over`` must span 1 to {MAX_POINTS:,} points, got {total:,}")
     return values
 
 
-def _listed(name: str, values: Any) -> list[float]:
+def _checked_list(name: str, values: Any) -> list[float]:
     array = real_array(name, values)
     if array.ndim != 1 or not np.isfinite(array).all():
         raise Refusal(
@@ -126,7 +131,7 @@ def _listed(name: str, values: Any) -> list[float]:
     return array.tolist()
 
 
-class At(NamedTuple):
+class SceneFactory(NamedTuple):
     """The scene at a point of a grid."""
 
     tables: dict[str, Any]
@@ -136,7 +141,7 @@ class At(NamedTuple):
     def __call__(self, point: tuple[float, ...]) -> Any:
         tables = self.tables
         for name, value in zip(self.names, point):
-            tables = changed(tables, name, value)
+            tables = with_parameter(tables, name, value)
         return from_tables(tables, self.scene.name, self.scene.text)
 
 
@@ -157,7 +162,7 @@ class Points:
         )
 
 
-def changed(tables: dict, parameter: str, value: float) -> dict:
+def with_parameter(tables: dict, parameter: str, value: float) -> dict:
     """Return the tables with one parameter set: "section.key", "effects.KIND.key" for an effect that is on, or
     "effects.key" for all effects that give that key."""
     parts = parameter.split(".")
@@ -167,7 +172,7 @@ def changed(tables: dict, parameter: str, value: float) -> dict:
         else None
     )
     if isinstance(within, dict):  # a table inside a table
-        inner = changed({"robot": within}, f"robot.{parts[2]}", value)
+        inner = with_parameter({"robot": within}, f"robot.{parts[2]}", value)
         return {**tables, "robot": {**tables["robot"], parts[1]: inner["robot"]}}
     if len(parts) == 2 and parts[0] in (
         "medium",
@@ -184,7 +189,7 @@ def changed(tables: dict, parameter: str, value: float) -> dict:
             parts[0]: {
                 k: v
                 for k, v in tables.get(parts[0], {}).items()
-                if k != _twin(parts[1])
+                if k != _key_in_other_unit(parts[1])
             },
         }
         value = (
@@ -230,12 +235,12 @@ def changed(tables: dict, parameter: str, value: float) -> dict:
     )
 
 
-def _twin(key: str) -> str:
+def _key_in_other_unit(key: str) -> str:
     """Return the name of the same key in degrees, or in rad."""
     return key.removesuffix("_deg") if key.endswith("_deg") else f"{key}_deg"
 
 
-def at_points(over: Mapping[str, list[float]], names: tuple[str, ...], value):
+def values_at_points(over: Mapping[str, list[float]], names: tuple[str, ...], value):
     """Return a number (N_1, ...) at the points of a sweep: the swept parameter with one of these names, else ``value``,
     or None."""
     for axis, (name, values) in enumerate(over.items()):

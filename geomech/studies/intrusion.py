@@ -13,7 +13,7 @@ from geomech.core.summary import effect_lines
 from geomech.core.variables import Result, Variable
 from geomech.run.cost import BASE, Cost
 from geomech.scenes.intruding import Intruding
-from geomech.studies.settings import Choice, Measured, cheapest
+from geomech.studies.settings import Choice, Measurements, choice_variables
 
 UNITS = {  # by the first part of names
     "t": "s",
@@ -149,7 +149,7 @@ class Settings:
         *counts, finest = self.scene.ladder
         return total_cost(self.scene, finest + self.runs * sum(counts))
 
-    def prepared(self) -> Settings:
+    def with_shared_data(self) -> Settings:
         return self
 
     def settings(self) -> list[Setting]:
@@ -158,7 +158,7 @@ class Settings:
         values = tuple(self.scene.actual_count(n) for n in self.scene.ladder[:-1])
         return [Setting(self.scene.parts, values, self.scene.order, against="limit")]
 
-    def numbers(self, setting: Setting | None, value: Any) -> list[np.ndarray]:
+    def evaluate(self, setting: Setting | None, value: Any) -> list[np.ndarray]:
         """Return force (T, 2 or 3), N, and moment (T,) or (T, 3), N m, along the
         motion; with the finest parts for None."""
         *counts, count = self.scene.ladder
@@ -185,7 +185,7 @@ class Settings:
             errors[what] = float(np.sqrt(np.mean((one - exact) ** 2)) / scale)
         return errors
 
-    def choices(self, measured: Measured) -> list[Variable]:
+    def choices(self, measured: Measurements) -> list[Variable]:
         """Return the fewest of the tried parts that meet tolerances in force and
         moment."""
         errors = np.maximum(*measured.errors.values())
@@ -196,7 +196,7 @@ class Settings:
                 return Choice(0, int(within[0]))
             return None
 
-        return cheapest(measured, errors, self.unit, TOLERANCES, choose)
+        return choice_variables(measured, errors, self.unit, TOLERANCES, choose)
 
     def facts(self) -> dict[str, Any]:
         scene = self.scene

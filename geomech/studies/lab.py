@@ -12,14 +12,14 @@ from geomech.scenes.model import Scene
 from geomech.studies import charts, cost
 from geomech.studies.charts import Chart
 from geomech.studies.cycles import Cycles
-from geomech.studies.grid import Grid, listed
+from geomech.studies.grid import Grid, checked_grid_values
 from rft.core.refusal import Refusal
 
 GALLERY = (  # in which a page shows them
     "three-link-glass", "three-link-glass-close", "three-link-coulomb", "three-link-viscous", "serpenoid-glass",
     "seven-link-modes",
 )  # fmt: skip
-MEMBERS = range(2, 34)  # of a family
+N_MEMBERS = range(2, 34)  # of a family
 SECTIONS = ("medium", "body", "system", "physical")  # that a family may vary
 
 
@@ -33,8 +33,8 @@ class Lab:
     scenes: tuple[Scene, ...]
     over: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
-    less: ClassVar[str] = "ask for less"
-    worth_saying: ClassVar[float] = WORTH_SAYING
+    cheaper_alternative: ClassVar[str] = "ask for less"
+    report_above: ClassVar[float] = WORTH_SAYING
 
     @property
     def scene(self) -> Scene:
@@ -67,7 +67,7 @@ class Lab:
 
     @cached_property
     def _grid(self) -> Grid:
-        return Cycles().grid(self.scene, listed(self.over))
+        return Cycles().grid(self.scene, checked_grid_values(self.over))
 
     @cached_property
     def _own(self) -> float:
@@ -98,14 +98,16 @@ class Lab:
     @cached_property
     def _values(self) -> list[float]:
         """Values of the members, with the scene's own."""
-        found = sorted({*next(iter(listed(self.over).values())), self._own})
-        if len(found) not in MEMBERS:
+        found = sorted(
+            {*next(iter(checked_grid_values(self.over).values())), self._own}
+        )
+        if len(found) not in N_MEMBERS:
             raise Refusal(
-                f"a family has {MEMBERS[0]} to {MEMBERS[-1]} members, its own value counted", value=len(found),
+                f"a family has {N_MEMBERS[0]} to {N_MEMBERS[-1]} members, its own value counted", value=len(found),
                 where="``over``", instead="give fewer or more values",
             )  # fmt: skip
-        for value in (*found, *charts.middles(found)):
-            charts.refuse(self._grid.at((value,)))
+        for value in (*found, *charts.midpoints(found)):
+            charts.refuse(self._grid.scene_factory((value,)))
         return found
 
     def cost(self) -> Cost:
@@ -115,7 +117,7 @@ class Lab:
             for k, scene in enumerate(self.scenes)
             for job in (1 if k else times) * _jobs(scene)
         ]
-        return cost.price(jobs)
+        return cost.total_cost(jobs)
 
     def charts(self, progress: Callable[[float], None]) -> list[Chart]:
         """Return a chart for each scene. progress: called with the fraction done."""
@@ -129,10 +131,10 @@ class Lab:
         return found
 
     def _family(self, progress: Callable) -> Chart:
-        values, between = self._values, charts.middles(self._values)
+        values, between = self._values, charts.midpoints(self._values)
         made = {}
         for value in (*values, *between):
-            made[value] = charts.chart(self._grid.at((value,)))
+            made[value] = charts.chart(self._grid.scene_factory((value,)))
             progress(len(made) / (len(values) + len(between)) / len(self.scenes))
         some = [made[v] for v in values]
         family = charts.family(
@@ -148,9 +150,9 @@ class Lab:
 
 def _jobs(scene: Scene) -> list[cost.Job]:
     jobs = [
-        *cost.connection(scene),
-        *([] if scene.system.traits.linear else cost.harmonics(scene)),
+        *cost.connection_jobs(scene),
+        *([] if scene.system.traits.linear else cost.harmonic_jobs(scene)),
     ]
     if scene.frame != charts.MINIMUM_PERTURBATION:
-        jobs += cost.connection(scene)  # that of the minimum-perturbation frame
+        jobs += cost.connection_jobs(scene)  # that of the minimum-perturbation frame
     return jobs

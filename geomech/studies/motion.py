@@ -15,9 +15,9 @@ from geomech.geometry.symmetry import zero_components
 from geomech.run.cost import Cost
 from geomech.scenes.model import Scene
 from geomech.studies import fields
-from geomech.studies.cost import connection, cycles_of, direct, price
+from geomech.studies.cost import connection_jobs, direct_jobs, n_cycles, total_cost
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.tables import COMPONENTS, POSE, zero_words
+from geomech.studies.tables import COMPONENTS, POSE, zero_reason
 from geomech.systems.base import body_size, length_unit, shape_labels
 from geomech.systems.capabilities import (
     Drawable,
@@ -148,7 +148,7 @@ def final_pose(motion: Motion) -> list[Variable]:
     for name, value, pose_unit in zip(POSE, motion.pose[-1], (unit, unit, "rad")):
         zero = ""
         if name in reasons:
-            zero = zero_words(reasons[name])
+            zero = zero_reason(reasons[name])
         label = "after the last cycle"
         found.append(Variable(f"final_{name}", (), value, pose_unit, label, zero=zero))
     return found
@@ -219,7 +219,7 @@ def cost(scene: Scene, cycles: int = 1, mapped: bool = False) -> Cost:
     """Return the cost of `answer` and a table of it."""
     parts = [cost_of_table(scene, cycles)]
     if mapped and is_mapped(scene):
-        parts.append(price(connection(scene)))
+        parts.append(total_cost(connection_jobs(scene)))
     return summed(parts)
 
 
@@ -239,10 +239,10 @@ def cost_of_table(scene: Scene, cycles: int) -> Cost:
     refuse_cycles(cycles)
     system = scene.system
     phases = scene.numerics.phases
-    jobs = direct(scene, scene.gait, 1, phases, checked=False)
+    jobs = direct_jobs(scene, scene.gait, 1, phases, checked=False)
     if system.traits.steps and not settling(system):
         # Each continues the one before; cycles up to the limit cycle are run first.
-        assumed = cycles_of(system)
+        assumed = n_cycles(system)
         first_cycles = assumed
         if system.traits.lacks & Premise.SE2_SYMMETRIC:
             first_cycles = 0
@@ -251,8 +251,7 @@ def cost_of_table(scene: Scene, cycles: int) -> Cost:
             job._replace(count=job.count * times, batches=job.batches * times)
             for job in jobs
         ]
-    total = price(jobs)
-    rows = cycles * phases + 1
+    total, rows = total_cost(jobs), cycles * phases + 1
     width = 2 * (balance_size(system).elements + 1) + system.joints + 5
     memory = 8 * COPIES * rows * (system.joints + 5 + width)
     seconds = SECONDS_PER_NUMBER * rows * width

@@ -29,7 +29,7 @@ from geomech.run.progress import progress as shown_progress
 from geomech.scenes.frames import framed
 from geomech.scenes.model import Scene, frequency_of
 from geomech.studies import cost, effort, estimate, tables, uncertainty
-from geomech.studies.available import default_tiers, tiers
+from geomech.studies.available import available_tiers, default_tiers
 from geomech.systems.base import body_size, refuse_singular, shape_labels
 from geomech.systems.capabilities import gaits_per_batch, stored_table
 from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
@@ -78,7 +78,7 @@ class SceneTables:
     @property
     def tiers(self) -> tuple[str, ...]:
         """Names of the tiers that predict the scene's system."""
-        return tiers(self.scene.system)
+        return available_tiers(self.scene.system)
 
     def with_numerics(self, **numerics: Any) -> Self:
         """Return the study with other [numerics] and the same stored tables; an entry
@@ -278,10 +278,12 @@ class SceneTables:
         numerics = self.scene.numerics
         table = harmonic.table(system, numerics)
         key = (table.name, system, table.key)
-        if not effort.shared(system) or key in self._tables:
-            return effort.table(system, numerics, progress)
+        if not effort.shares_velocities(system) or key in self._tables:
+            return effort.fit_metric(system, numerics, progress)
         # The velocities of the metric are those of the harmonics.
-        both, seconds = timed_call(effort.with_harmonics, system, numerics, progress)
+        both, seconds = timed_call(
+            effort.fit_with_harmonics, system, numerics, progress
+        )
         harmonics, norm = both
         self._tables[key] = (harmonics, seconds)
         return norm
@@ -343,7 +345,7 @@ class SceneTables:
         gait: Gait | None = None,
         progress: Callable | None = None,
     ) -> Result:
-        """Return the net poses (`geomech.studies.tables.result`) by tiers of TIERS
+        """Return the net poses (`geomech.studies.tables.displacement_result`) by tiers of TIERS
         (`default_tiers` if None), with their errors (`geomech.studies.estimate`).
 
         seconds, by part: time to build each table ("field", "harmonic table" ...), even
@@ -354,13 +356,13 @@ class SceneTables:
         scene = self.scene
         gait, values, plans = self._checked_request(gait, amplitudes, tiers)
         # The medium first, as it may refuse.
-        medium, took = timed_call(uncertainty.of_medium, scene, gait, values)
+        medium, took = timed_call(uncertainty.medium_spread, scene, gait, values)
         seconds, computed_before = self._build_all(plans, progress)
         if medium:
             seconds["medium"] = took
         poses, errors, spreads = self._predict(plans, gait, values, seconds)
-        timings = tables.timings(seconds, computed_before)
-        return tables.result(
+        timings = tables.timing_variables(seconds, computed_before)
+        return tables.displacement_result(
             scene, gait, values, poses, errors, medium, spreads, timings
         )
 
@@ -418,7 +420,7 @@ class SceneTables:
 
             poses[tier], seconds[tier] = timed_call(self.poses, tier, gait, amplitudes)
             error, took = timed_call(
-                estimate.against_direct,
+                estimate.errors_from_direct,
                 scene, poses[tier], gait, amplitudes, reference,
             )  # fmt: skip
             spread = self.spread(tier, gait, amplitudes)
@@ -445,8 +447,8 @@ class SceneTables:
             gait, amplitudes, tiers, CHECKED_AMPLITUDES, CHECKED_PHASES
         )
         with located(self.scene.name):
-            jobs = cost.study(self.scene, plans, len(values), gait)
-            return cost.price([*jobs, *more])
+            jobs = cost.study_jobs(self.scene, plans, len(values), gait)
+            return cost.total_cost([*jobs, *more])
 
     def _checked_request(
         self,

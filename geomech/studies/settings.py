@@ -12,13 +12,13 @@ import numpy as np
 from geomech.core.setting import ROUNDING, Setting
 from geomech.core.variables import Variable
 
-OVER = ("setting", "fineness")
+DIMS = ("setting", "fineness")
 NONE = "none"  # stands for a setting where none meets a tolerance
-LEAST = 3  # errors above rounding from which an order is measured
+MIN_ERRORS = 3  # errors above rounding from which an order is measured
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class Measurements:
     """Runs at the values of settings, from coarse to fine.
 
     values, seconds and errors, by their names: (S, F) of S settings; nan behind the last
@@ -37,7 +37,7 @@ class Choice(NamedTuple):
     value: int
 
 
-def padded(rows: Sequence[Sequence[float]]) -> np.ndarray:
+def padded_array(rows: Sequence[Sequence[float]]) -> np.ndarray:
     """Return rows of different lengths as one array, filled with nan."""
     longest = max(map(len, rows))
     array = np.full((len(rows), longest), np.nan)
@@ -46,11 +46,11 @@ def padded(rows: Sequence[Sequence[float]]) -> np.ndarray:
     return array
 
 
-def order(values: np.ndarray, errors: np.ndarray) -> float:
+def measured_order(values: np.ndarray, errors: np.ndarray) -> float:
     """Return the measured order of errors in the coarseness, by least squares; nan where
-    fewer than `LEAST` are more than rounding."""
+    fewer than `MIN_ERRORS` are more than rounding."""
     is_seen = errors > ROUNDING
-    if is_seen.sum() < LEAST:
+    if is_seen.sum() < MIN_ERRORS:
         return np.nan
     x = np.log(values[np.isfinite(values)])
     slope = np.polyfit(np.log(values[is_seen]), np.log(errors[is_seen]), 1)[0]
@@ -64,8 +64,8 @@ def order_name(error: str) -> str:
     return error.removesuffix("error") + "order"
 
 
-def variables(
-    measured: Measured, unit: str, labels: Mapping[str, str]
+def measurement_variables(
+    measured: Measurements, unit: str, labels: Mapping[str, str]
 ) -> Iterator[Variable]:
     """Yield settings, values, seconds, errors in ``unit``, and orders."""
     settings = measured.settings
@@ -80,17 +80,17 @@ def variables(
     for name, words in texts.items():
         if any(words):
             yield Variable(name, ("setting",), np.array(words))
-    yield Variable("value", OVER, measured.values, "", "of the setting")
-    yield Variable("seconds", OVER, measured.seconds, "s", "of the quickest run")
+    yield Variable("value", DIMS, measured.values, "", "of the setting")
+    yield Variable("seconds", DIMS, measured.seconds, "s", "of the quickest run")
     for name, errors in measured.errors.items():
-        yield Variable(name, OVER, errors, unit, labels[name])
-        orders = [order(*pair) for pair in zip(measured.values, errors)]
+        yield Variable(name, DIMS, errors, unit, labels[name])
+        orders = [measured_order(*pair) for pair in zip(measured.values, errors)]
         label = "measured, nan where all is rounding"
         yield Variable(order_name(name), ("setting",), np.array(orders), "1", label)
 
 
-def cheapest(
-    measured: Measured,
+def choice_variables(
+    measured: Measurements,
     errors: np.ndarray,
     unit: str,
     tolerances: np.ndarray,

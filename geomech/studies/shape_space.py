@@ -21,16 +21,16 @@ from geomech.scenes.model import Scene
 from geomech.studies import fields
 from geomech.studies.cost import (
     Job,
-    frame,
-    harmonics,
-    of_even_part,
-    of_metric,
-    of_planes,
-    price,
+    even_part_jobs,
+    frame_jobs,
+    harmonic_jobs,
+    metric_jobs,
+    plane_jobs,
+    total_cost,
 )
-from geomech.studies.cost import connection as fitted
-from geomech.studies.cost import study as displacement
-from geomech.studies.effort import shared, why_none
+from geomech.studies.cost import connection_jobs as fitted
+from geomech.studies.cost import study_jobs as displacement
+from geomech.studies.effort import shares_velocities, why_no_metric
 from geomech.studies.fields import WHOLE, has_matrix
 from geomech.studies.scene_tables import SceneTables, refuse_outside
 from geomech.studies.tables import COMPONENTS, POSE
@@ -41,11 +41,11 @@ from geomech.tiers.harmonic import is_looked_up
 from rft.core.checks import is_whole
 from rft.core.refusal import Refusal, located
 
-NO_MAP = "a body of one joint has no map, a loop of it encloses no area: give it one joint more, or drop the figure"
-MOST_PAIRS = 10  # of joints in a figure: as many as five joints have
+NO_MAP_MESSAGE = "a body of one joint has no map, a loop of it encloses no area: give it one joint more, or drop the figure"
+MAX_PAIRS = 10  # of joints in a figure: as many as five joints have
 
 
-class Space(NamedTuple):
+class ShapeSpace(NamedTuple):
     """What is computed over shape space.
 
     study: the tables of the scene. other, other_planes: the tables and the planes in
@@ -91,7 +91,7 @@ class Plan:
         return self.study.scene
 
     @property
-    def less(self) -> str:
+    def cheaper_alternative(self) -> str:
         """Advice where it costs too much."""
         joints = self.scene.system.joints
         if joints > 2 and self.field:
@@ -109,7 +109,7 @@ class Plan:
     def _costed(self) -> bool:
         """Whether the metric is computed."""
         system = self.scene.system
-        needed = {"": False, WHOLE: not why_none(system)}
+        needed = {"": False, WHOLE: not why_no_metric(system)}
         return self.metric or needed.get(self.file, has_matrix(system))
 
     @property
@@ -130,25 +130,25 @@ class Plan:
         joints = self.scene.system.joints
         pairs = list(combinations(range(joints), 2))
         if self.pair is not None:
-            pairs = [_pair(self.pair, joints)]
-        if len(pairs) > MOST_PAIRS:
+            pairs = [_checked_pair(self.pair, joints)]
+        if len(pairs) > MAX_PAIRS:
             raise Refusal(
                 f"{joints} joints have {len(pairs)} pairs",
                 instead=f"say which, such as ``pair`` 1,{joints}, or give a chain [body] "
                 "modes",
             )
         alone = self.pair is not None
-        return [(one, through(self.scene, one, self.held, alone)) for one in pairs]
+        return [(one, plane_origin(self.scene, one, self.held, alone)) for one in pairs]
 
     def check(self) -> None:
         system, name = self.scene.system, self.scene.name
         with located(name):
             refuse(system)
             if (self.mapped or self.planes) and system.joints == 1:
-                raise Refusal(NO_MAP)
+                raise Refusal(NO_MAP_MESSAGE)
             if self.gait:
                 refuse_outside(self.scene)
-            if self.metric and (reason := why_none(system)):
+            if self.metric and (reason := why_no_metric(system)):
                 raise Refusal(reason, where=name)
             if self.other_frame is not None and len(self.at) > 1:
                 raise Refusal(
@@ -159,7 +159,7 @@ class Plan:
 
     def cost(self) -> Cost:
         with located(self.scene.name):
-            return price(
+            return total_cost(
                 [
                     job
                     for study in filter(None, (self.study, self.other))
@@ -169,7 +169,9 @@ class Plan:
 
     def _jobs(self, study: SceneTables) -> list[Job]:
         scene = study.scene
-        jobs = [*of_planes(scene, *zip(*self.at)), *frame(scene)] if self.at else []
+        jobs = (
+            [*plane_jobs(scene, *zip(*self.at)), *frame_jobs(scene)] if self.at else []
+        )
         if not self.field:
             return jobs
         if self._enclosed and study is self.study:
@@ -178,16 +180,17 @@ class Plan:
             )
         jobs += fitted(scene)
         if study is self.study:
-            jobs += of_metric(scene) if self._costed else []
-            jobs += of_even_part(scene) if self.file else []
+            jobs += metric_jobs(scene) if self._costed else []
+            jobs += even_part_jobs(scene) if self.file else []
             jobs += (
-                harmonics(scene)
-                if self._harmonics and not (self._costed and shared(scene.system))
+                harmonic_jobs(scene)
+                if self._harmonics
+                and not (self._costed and shares_velocities(scene.system))
                 else []
             )
         return jobs
 
-    def compute(self, progress: Callable) -> Space:
+    def compute(self, progress: Callable) -> ShapeSpace:
         """Return what is computed."""
         study, parts, start = self.study, self._parts(), time.perf_counter()
         values = [
@@ -203,7 +206,7 @@ class Plan:
         if self._enclosed:
             amplitude = self.scene.gait.amplitude
             enclosed = study.displacements([amplitude], [AREA.name])
-        return Space(
+        return ShapeSpace(
             study,
             self.other,
             tuple(values[:count]),
@@ -232,12 +235,12 @@ class Plan:
         )
 
 
-def plane_ccfs(name: str, planes: Sequence[Plane]) -> list[Variable]:
+def ccf_variables(name: str, planes: Sequence[Plane]) -> list[Variable]:
     """Return the CCFs of planes as variables NAME_1_3, with their errors, and the shapes
     through which the planes go, as slice_1_3."""
     found = []
     for plane in planes:
-        dims, ending = dims_of(plane), ending_of(plane)
+        dims, ending = plane_dims(plane), joint_suffix(plane)
         units = fields.component_units(plane.ccf.unit, "rad2")
         label = f"CCF of joints {plane.pair[0] + 1} and {plane.pair[1] + 1}"
         error = plane.error.values
@@ -246,26 +249,26 @@ def plane_ccfs(name: str, planes: Sequence[Plane]) -> list[Variable]:
     return found
 
 
-def plane_connections(planes: Sequence[Plane]) -> list[Variable]:
+def connection_variables(planes: Sequence[Plane]) -> list[Variable]:
     """Return the connections of the two joints of planes as variables A_1_3."""
     found = []
     for plane in planes:
-        component, *angles = dims_of(plane)
+        component, *angles = plane_dims(plane)
         dims = (component, "moving_joint", *angles)
         units = fields.component_units(plane.connection.unit, "rad")
         label = "columns of A of the joints that move"
         values = plane.connection.A
-        found.append(Variable(f"A{ending_of(plane)}", dims, values, units, label))
+        found.append(Variable(f"A{joint_suffix(plane)}", dims, values, units, label))
     return found
 
 
-def slices(planes: Sequence[Plane]) -> list[Variable]:
+def slice_variables(planes: Sequence[Plane]) -> list[Variable]:
     """Return the axes of planes, and the shapes through which they go."""
     axes, shapes = {}, []
     for plane in planes:
-        _, *angles = dims_of(plane)
+        _, *angles = plane_dims(plane)
         axes.update(zip(angles, plane.connection.axes))
-        name = f"slice{ending_of(plane)}"
+        name = f"slice{joint_suffix(plane)}"
         label = "shape through which the plane goes"
         shapes.append(Variable(name, ("joint",), plane.at, "rad", label))
     coordinates = [Variable(name, (name,), axis, "rad") for name, axis in axes.items()]
@@ -275,20 +278,20 @@ def slices(planes: Sequence[Plane]) -> list[Variable]:
     return [component, joint, *coordinates, *shapes]
 
 
-def ending_of(plane: Plane) -> str:
+def joint_suffix(plane: Plane) -> str:
     i, j = plane.pair
     return f"_{i + 1}_{j + 1}"
 
 
-def dims_of(plane: Plane) -> tuple[str, str, str]:
+def plane_dims(plane: Plane) -> tuple[str, str, str]:
     i, j = plane.pair
     return ("component", f"alpha_{i + 1}", f"alpha_{j + 1}")
 
 
 ROUNDING = 1e-12  # largest size of a component that is nothing but roundoff
-RAYS = 72  # directions from the gait's middle in which the zero line is looked for
-STEPS = 200  # places along each
-FIRST = 0.02  # place on a ray, of its length
+N_RAYS = 72  # directions from the gait's middle in which the zero line is looked for
+N_STEPS = 200  # places along each
+FIRST_STEP = 0.02  # place on a ray, of its length
 
 
 def zero_line(ccf: Field, middle: np.ndarray) -> list[Variable]:
@@ -299,10 +302,10 @@ def zero_line(ccf: Field, middle: np.ndarray) -> list[Variable]:
     if x.masked or np.abs(x.values).max() < ROUNDING:
         return []
     reach = min(min(a[-1] - m, m - a[0]) for a, m in zip(x.axes, middle))
-    angles = 2 * np.pi * np.arange(RAYS) / RAYS
-    steps = np.linspace(FIRST, 1, STEPS) * reach
+    angles = 2 * np.pi * np.arange(N_RAYS) / N_RAYS
+    steps = np.linspace(FIRST_STEP, 1, N_STEPS) * reach
     rays = np.stack([np.cos(angles), np.sin(angles)], -1)[:, None] * steps[:, None]
-    changed = np.zeros((RAYS, STEPS - 1), bool)
+    changed = np.zeros((N_RAYS, N_STEPS - 1), bool)
     if x.values.min() < 0 < x.values.max():
         changed = np.diff(np.sign(x(middle + rays)), axis=1) != 0
     some = changed.any(1)
@@ -334,7 +337,7 @@ def enclosed_area(area: Result) -> list[Variable]:
     return variables
 
 
-def _pair(pair: Any, joints: int) -> tuple[int, int]:
+def _checked_pair(pair: Any, joints: int) -> tuple[int, int]:
     """Return the joints, counted from 0, of a text such as 1,3 or of two numbers."""
     names = pair
     if isinstance(pair, str):
@@ -354,7 +357,7 @@ def _pair(pair: Any, joints: int) -> tuple[int, int]:
     return i, j
 
 
-def through(
+def plane_origin(
     scene: Scene, pair: tuple[int, int], angles: tuple[float, ...] | None, alone: bool
 ) -> np.ndarray:
     """Return the shape through which the plane of a pair of joints goes. alone: angles may be those of the fixed joints

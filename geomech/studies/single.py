@@ -15,7 +15,7 @@ from rft.core.refusal import Refusal, formatted
 def velocity(system: System, alpha, alphadot) -> list[Variable]:
     """Return the body velocity xi (3,) for one shape (joints,) and its rate, with the
     residual and the status of the balance of forces; nan where a residual is unknown."""
-    solution = single(system, alpha, alphadot)
+    solution = diagnosed_velocity(system, alpha, alphadot)
     unit = length_unit(system)
     residual = solution["residual"]
     if residual is None:
@@ -37,7 +37,7 @@ def velocity(system: System, alpha, alphadot) -> list[Variable]:
     return variables
 
 
-def single(system: System, alpha, alphadot) -> dict:
+def diagnosed_velocity(system: System, alpha, alphadot) -> dict:
     """Return {"xi", "status", "residual"} for one shape (joints,) and its rate;
     ValueError if it is singular."""
     alpha, alphadot = (

@@ -17,11 +17,11 @@ from geomech.core.variables import Result, Variable
 from geomech.run.cost import Cost
 from geomech.run.runner import digest_context, runner, store_results
 from geomech.scenes.read import inputs
-from geomech.studies.grid import Grid, listed
+from geomech.studies.grid import Grid, checked_grid_values
 from rft.core.refusal import Refusal
 
 
-class Batched(Protocol):
+class BatchedQuestion(Protocol):
     """A question about many scenes at once: that of a sweep.
 
     It knows its scenes and how to batch them; the sweep knows the grid, the order and the runner."""
@@ -32,7 +32,7 @@ class Batched(Protocol):
     def cost(self, grid: Grid) -> Cost:
         """Return the cost of all points."""
 
-    def together(self, scene: Any) -> int:
+    def batch_size(self, scene: Any) -> int:
         """Return the number of rows of such scenes in a batch."""
 
     def rows(self, scenes: list, inner_values: list[float] | None) -> np.ndarray:
@@ -44,7 +44,7 @@ class Batched(Protocol):
         """Return the answer from rows (N_1, ..., width) as variables, and attributes of the whole sweep."""
 
 
-def batched(scene: Any) -> Batched:
+def batched_question(scene: Any) -> BatchedQuestion:
     """Return the question of sweeps over a scene: the displacement of a gait, or the speed of a robot."""
     kind, module = (
         ("Walks", "walking") if hasattr(scene, "robot") else ("Cycles", "cycles")
@@ -62,13 +62,13 @@ class Plan:
     over: Mapping[str, Sequence[float]]
 
     @cached_property
-    def question(self) -> Batched:
-        return batched(self.scene)
+    def question(self) -> BatchedQuestion:
+        return batched_question(self.scene)
 
     @cached_property
     def grid(self) -> Grid:
         """The grid; Refusal if a point of it makes no scene."""
-        return self.question.grid(self.scene, listed(self.over))
+        return self.question.grid(self.scene, checked_grid_values(self.over))
 
     @cached_property
     def cost(self) -> Cost:
@@ -79,11 +79,11 @@ class Plan:
 
         seconds: of computing, if known, so that other processes start sooner."""
         grid = self.grid
-        parts = -(-grid.total // self.question.together(self.scene))
-        common = (self.question, grid.at)
+        parts = -(-grid.total // self.question.batch_size(self.scene))
+        common = (self.question, grid.scene_factory)
         arguments = batches(self.question, grid)
         rows, completed = [], 0
-        for part in runner().map(answered, common, arguments, parts, seconds):
+        for part in runner().map(compute_batch, common, arguments, parts, seconds):
             rows.append(part)
             completed += len(part)
             progress(completed / grid.total)
@@ -100,24 +100,27 @@ class Plan:
         return Result("sweep", (*axes, *others), facts)
 
 
-def batches(question: Batched, grid: Grid) -> Iterator[tuple]:
+def batches(question: BatchedQuestion, grid: Grid) -> Iterator[tuple]:
     """Yield the batches in order: (scenes, or their points, values of the inner parameter)."""
     points, inner_values = grid.points, grid.inner_values
     count, completed = len(inner_values or [0]), 0
     while completed < grid.total:
         k, j = divmod(completed, count)  # inner values vary fastest
-        most = question.together(grid.at(points[k]))
+        most = question.batch_size(grid.scene_factory(points[k]))
         indices = range(
             k, min(k + max(1, most // count), points.total) if j == 0 else k + 1
         )
         values = inner_values[j : j + most] if inner_values else None
         batch = [points[i] for i in indices]
         # Workers may lack the files, so they receive scenes.
-        yield [grid.at(p) for p in batch] if grid.scene.files else batch, values
+        yield (
+            [grid.scene_factory(p) for p in batch] if grid.scene.files else batch,
+            values,
+        )
         completed += len(indices) * len(values or [0])
 
 
-def answered(common: tuple, part: tuple) -> np.ndarray:
+def compute_batch(common: tuple, part: tuple) -> np.ndarray:
     """Return the rows of a batch."""
     (question, at), (batch, inner_values) = common, part
     scenes = [at(p) if isinstance(p, tuple) else p for p in batch]
@@ -133,22 +136,24 @@ def sweep(
     """Return the displacement of a scene's gait by the direct tier, or the speed of its
     robot, over a grid of parameters.
 
-    Points that differ only in the gait or in batched fields of effects (`batched` in
+    Points that differ only in the gait or in batched fields of effects (`batched_question` in
     rft/effects), and robots, are solved in batches. partial: a file that stores finished
     batches, so that the same sweep resumes; the caller removes it after saving the
     results. Executors: see `geomech.run.workers`. Refusal if a point of the grid makes no
     scene."""
     plan = Plan(scene, over)
     _ = plan.grid  # refused before anything is stored
-    with stored_in(partial, scene):
-        return plan.result(progress or ignore)
+    with store_batches(partial, scene):
+        return plan.result(progress or ignore_progress)
 
 
-def ignore(_: float) -> None:
+def ignore_progress(_: float) -> None:
     """Take no notice of progress."""
 
 
-def stored_in(partial: Path | None, scene: Any) -> contextlib.AbstractContextManager:
+def store_batches(
+    partial: Path | None, scene: Any
+) -> contextlib.AbstractContextManager:
     """Store finished batches in a file, if one is given; it stays until the caller removes
     it."""
     if partial is None:

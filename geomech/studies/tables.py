@@ -19,10 +19,10 @@ COMPONENTS = ("x", "y", "theta")  # of a velocity in the body frame
 QUANTITIES = ("x", "y", "heading", "net_distance")  # of a pose
 POSE = QUANTITIES[:3]
 SURFACE = ("surface_spread", "surface_spread_heading")
-OVER = ("tier", "amplitude")
+DIMS = ("tier", "amplitude")
 
 
-def of_pose(poses) -> dict[str, np.ndarray]:
+def pose_quantities(poses) -> dict[str, np.ndarray]:
     """Return QUANTITIES (...,) of net poses (..., 3); the net distance is the length of
     (x, y)."""
     x, y, heading = np.moveaxis(np.asarray(poses, float), -1, 0)
@@ -34,7 +34,7 @@ def poses(result: Mapping[str, Variable]) -> np.ndarray:
     return np.stack([result[name].values for name in POSE], -1)
 
 
-def zero_words(why: str) -> str:
+def zero_reason(why: str) -> str:
     """Return why a quantity is zero, for a reason of `zero_components`."""
     return f"by symmetry, as {why}"
 
@@ -58,7 +58,7 @@ def pose_variables(
     errors = np.asarray(errors)
     zero = zero or {}
     variables = []
-    for name, values in of_pose(poses).items():
+    for name, values in pose_quantities(poses).items():
         is_heading = name == "heading"
         spreads = None
         if spread is not None:
@@ -89,7 +89,7 @@ def scaled(variable: Variable, factor: Any, name: str, unit: str, label: str):
     )
 
 
-def result(
+def displacement_result(
     scene: Scene,
     gait: Gait,
     amplitudes,
@@ -105,7 +105,7 @@ def result(
 
     errors: (B, 2) by tier, as `geomech.studies.estimate` gives them, in body lengths and
     rad. medium: what the uncertainty of the medium does to the true displacement, and so
-    to every tier's (`geomech.studies.uncertainty.of_medium`), or None. choices: (B, 2),
+    to every tier's (`geomech.studies.uncertainty.medium_spread`), or None. choices: (B, 2),
     the system's unit and rad, of tiers whose answer depends on the surface that a loop of
     three and more joints spans. more: variables, such as the seconds that parts took.
     facts: attributes."""
@@ -120,12 +120,12 @@ def result(
 
     values = np.asarray(amplitudes, float)
     why = zero_components(system.traits, gait, amplitudes)
-    zero = {name: zero_words(reason) for name, reason in why.items()}
+    zero = {name: zero_reason(reason) for name, reason in why.items()}
     variables = [
         Variable("tier", ("tier",), np.array(tiers, dtype="U")),
         Variable("amplitude", ("amplitude",), values, "", gait.amplitude_label),
         *pose_variables(
-            OVER,
+            DIMS,
             stacked(poses, 3),
             stacked(errors, 2) * [length, 1.0],
             unit,
@@ -142,15 +142,15 @@ def result(
     }
     if frequency is not None:
         attributes["frequency"] = float(frequency)
-        variables += rates(variables, float(frequency), length)
+        variables += rate_variables(variables, float(frequency), length)
     if medium is not None:
-        variables += of_medium(medium, unit)
+        variables += medium_variables(medium, unit)
     if choices:
         unknown = np.full((len(amplitudes), 2), np.nan)
         spread = stacked({t: choices.get(t, unknown) for t in tiers}, 2)
         label = "how far surfaces that a loop spans differ"
         for k, (name, of) in enumerate(zip(SURFACE, (unit, "rad"))):
-            variables.append(Variable(name, OVER, spread[..., k], of, label))
+            variables.append(Variable(name, DIMS, spread[..., k], of, label))
     if system.joints == 2:
         area, area_error = loop_area(gait, scene.numerics.phases, values)
         label = "in shape space, counter-clockwise positive"
@@ -162,7 +162,7 @@ def result(
     return Result("displacement", (*variables, *more), {**attributes, **facts})
 
 
-def rates(
+def rate_variables(
     variables: Sequence[Variable], frequency: float, length: float
 ) -> list[Variable]:
     """Return the speed in body lengths and the turning rate."""
@@ -178,7 +178,7 @@ def rates(
     ]
 
 
-def of_medium(medium: Mapping, unit: str) -> list[Variable]:
+def medium_variables(medium: Mapping, unit: str) -> list[Variable]:
     """Return the shift of the mean over uncertain media, and how their spread was
     propagated."""
     shift = np.array([medium["shift"][name] for name in QUANTITIES])
@@ -202,7 +202,9 @@ def position_spread(result: Mapping[str, Variable]) -> np.ndarray:
     return np.hypot(result["x"].spread, result["y"].spread)
 
 
-def timings(took: Mapping[str, float], stored: Sequence[str]) -> list[Variable]:
+def timing_variables(
+    took: Mapping[str, float], stored: Sequence[str]
+) -> list[Variable]:
     """Return the seconds that parts of a computation took, and whether they were computed
     before."""
     before = [int(part in stored) for part in took]

@@ -16,9 +16,9 @@ from geomech.run.cost import Cost
 from geomech.scenes.model import Scene, checked_scene
 from geomech.studies import cost as foretold
 from geomech.studies import estimate
-from geomech.studies.available import tiers
+from geomech.studies.available import available_tiers
 from geomech.studies.scene_tables import SceneTables, refuse_outside
-from geomech.studies.settings import Choice, Measured, cheapest
+from geomech.studies.settings import Choice, Measurements, choice_variables
 from geomech.systems.base import body_size
 from geomech.systems.capabilities import (
     is_closed,
@@ -32,12 +32,12 @@ from geomech.tiers.base import Plan
 from geomech.tiers.direct import DIRECT
 from rft.core.refusal import Refusal, located
 
-FRACTIONS = np.array([0.4, 0.55, 0.7, 0.85, 1.0])  # of the gait's amplitude
+AMPLITUDE_FRACTIONS = np.array([0.4, 0.55, 0.7, 0.85, 1.0])  # of the gait's amplitude
 TOLERANCES = 10.0 ** -np.arange(1, 7)  # BL
 TRUTH_PHASES = 4096
 TRUTH_STEPS = 1024  # of time stepping, which is sequential
 FINE_PIECES = 320  # of body, where effects cut it
-FINEST = {
+FINEST_VALUES = {
     "loads": "exact",
     "regularisation": 1e-9,
     "directions": 192,
@@ -60,7 +60,9 @@ class Settings:
     scene: Scene
     runs: int = 2
 
-    about: ClassVar[str] = f"the displacement, rms over {len(FRACTIONS)} amplitudes,"
+    about: ClassVar[str] = (
+        f"the displacement, rms over {len(AMPLITUDE_FRACTIONS)} amplitudes,"
+    )
     unit: ClassVar[str] = "BL"
     measures: ClassVar[dict[str, str]] = {
         "error": "rms distance of positions over the amplitudes"
@@ -72,7 +74,7 @@ class Settings:
 
     @property
     def amplitudes(self) -> np.ndarray:
-        return self.scene.gait.amplitude * FRACTIONS
+        return self.scene.gait.amplitude * AMPLITUDE_FRACTIONS
 
     def check(self) -> None:
         """Refuse a gait that does not move, or leaves a field that a setting changes."""
@@ -88,8 +90,12 @@ class Settings:
 
     def cost(self) -> Cost:
         scene = self.scene
-        jobs = foretold.direct(
-            scene, scene.gait, len(FRACTIONS), _truth_phases(scene), checked=False
+        jobs = foretold.direct_jobs(
+            scene,
+            scene.gait,
+            len(AMPLITUDE_FRACTIONS),
+            _truth_phases(scene),
+            checked=False,
         )
         for setting in self.settings():
             jobs += [
@@ -98,26 +104,30 @@ class Settings:
                 for job in self.runs * self._jobs(setting, value)
             ]
             jobs += self._jobs(setting, None) if setting.against == "limit" else []
-        return foretold.price(jobs)
+        return foretold.total_cost(jobs)
 
     def _jobs(self, setting: Setting, value: Any) -> list[foretold.Job]:
         """Return the jobs of a displacement at a setting."""
         scene = self.at(setting, value)
         plan = _plan(scene, setting.tier)
         if not plan.exact:
-            return foretold.predicted(scene, plan, len(FRACTIONS))
-        return foretold.direct(
-            scene, scene.gait, len(FRACTIONS), scene.numerics.phases, checked=False
+            return foretold.prediction_jobs(scene, plan, len(AMPLITUDE_FRACTIONS))
+        return foretold.direct_jobs(
+            scene,
+            scene.gait,
+            len(AMPLITUDE_FRACTIONS),
+            scene.numerics.phases,
+            checked=False,
         )
 
-    def prepared(self) -> Settings:
+    def with_shared_data(self) -> Settings:
         return self
 
     def settings(self) -> list[Setting]:
         return [
             k
             for k in SETTINGS
-            if applies(k, self.scene)
+            if is_applicable(k, self.scene)
             and not (k.rule and not is_closed(self.scene.system))
         ]
 
@@ -148,9 +158,9 @@ class Settings:
             return scene.with_numerics(
                 interpolation=5, grid=4 * scene.numerics.grid - 3
             )
-        return scene.with_numerics(**{key: FINEST[key]})
+        return scene.with_numerics(**{key: FINEST_VALUES[key]})
 
-    def numbers(self, setting: Setting | None, value: Any) -> list[np.ndarray]:
+    def evaluate(self, setting: Setting | None, value: Any) -> list[np.ndarray]:
         """Return net poses (B, 3), with tables built anew so that their cost is counted."""
         tier = setting.tier if setting else DIRECT.name
         return [SceneTables(self.at(setting, value)).poses(tier, None, self.amplitudes)]
@@ -169,13 +179,13 @@ class Settings:
         system = self.scene.system
         shapes = self.scene.gait.cycle(self.scene.numerics.phases, self.amplitudes)
         error = table_error(system, *shapes)[..., 0]
-        if estimate.elements.elements_of(system):
+        if estimate.elements.n_elements(system):
             fewer = shapes[0][:, ::4], shapes[1][:, ::4]
             net = system.run(*fewer).net
             error = error + estimate.elements_error(system, fewer, net)[..., 0]
         return float(error.max())
 
-    def choices(self, measured: Measured) -> list[Variable]:
+    def choices(self, measured: Measurements) -> list[Variable]:
         """Return the cheapest values for tolerances, and the system's own error, which
         their errors include."""
         own = self.own_error
@@ -184,7 +194,7 @@ class Settings:
         def choose(tolerance: float) -> Choice | None:
             return quickest(measured, errors, tolerance)
 
-        found = cheapest(measured, errors, self.unit, TOLERANCES, choose)
+        found = choice_variables(measured, errors, self.unit, TOLERANCES, choose)
         label = self.scene.gait.amplitude_label
         found.append(Variable("amplitude", ("amplitude",), self.amplitudes, "", label))
         if own:
@@ -196,14 +206,14 @@ class Settings:
         return {}
 
 
-def applies(setting: Setting, scene: Scene) -> bool:
+def is_applicable(setting: Setting, scene: Scene) -> bool:
     """Return whether a setting applies to a scene."""
     system, key = scene.system, setting.key or setting.name
     if system.traits.linear and key in ("regularisation", "directions"):
         return False
     if key == "regularisation" and solver_of(system) is None:
         return False
-    if setting.tier not in tiers(system):
+    if setting.tier not in available_tiers(system):
         return False
     if setting.tier != DIRECT.name:
         of_a_field = TIERS[setting.tier].common and (
@@ -219,7 +229,10 @@ def applies(setting: Setting, scene: Scene) -> bool:
 def _plan(scene: Scene, tier: str) -> Plan:
     """Return the plan of a tier for the amplitudes of the study."""
     return TIERS[tier].plan(
-        scene.system, scene.numerics, scene.gait, scene.gait.amplitude * FRACTIONS
+        scene.system,
+        scene.numerics,
+        scene.gait,
+        scene.gait.amplitude * AMPLITUDE_FRACTIONS,
     )
 
 
@@ -227,7 +240,9 @@ def _truth_phases(scene: Scene) -> int:
     return TRUTH_STEPS if scene.system.traits.steps else TRUTH_PHASES
 
 
-def quickest(measured: Measured, errors: np.ndarray, tolerance: float) -> Choice | None:
+def quickest(
+    measured: Measurements, errors: np.ndarray, tolerance: float
+) -> Choice | None:
     """Return the quickest value whose error against the truth is at most the tolerance,
     the first of several; None if there is none."""
     found = None

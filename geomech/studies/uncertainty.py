@@ -17,7 +17,7 @@ import numpy as np
 
 from geomech.gaits import Gait
 from geomech.scenes.model import Scene
-from geomech.studies.tables import QUANTITIES, of_pose
+from geomech.studies.tables import QUANTITIES, pose_quantities
 from geomech.systems import System
 from geomech.systems.base import body_size
 from geomech.systems.capabilities import Uncertain, capability, gaits_per_batch
@@ -30,11 +30,13 @@ NONLINEAR = (
     1.02  # times the linear standard deviation, from which on the second order counts
 )
 DEVIATIONS = np.sqrt(3.0)  # standard deviations, of sigma points
-SHIFTED = 0.1  # of a standard deviation, from which on a shift of the mean is printed
-SEEN = 1e-6  # body lengths or rad: smaller standard deviations of second order are roundoff
+SMALLEST_SHIFT = (
+    0.1  # of a standard deviation, from which on a shift of the mean is printed
+)
+SMALLEST_SPREAD = 1e-6  # body lengths or rad: smaller standard deviations of second order are roundoff
 
 
-def root(covariance) -> np.ndarray:
+def covariance_root(covariance) -> np.ndarray:
     """Return standard deviations along the principal directions as columns (n, m): root @ root.T = covariance (n, n).
 
     Directions are those of the correlations, so that units do not matter; those without any spread are left out."""
@@ -48,14 +50,14 @@ def root(covariance) -> np.ndarray:
     ]
 
 
-def uncertain(system: System) -> bool:
+def is_uncertain(system: System) -> bool:
     """Return whether the system has parameters with a covariance."""
     return capability(system, Uncertain) is not None
 
 
-def points(system: System) -> int:
-    """Return the number of systems that `of_medium` runs."""
-    n = root(capability(system, Uncertain).covariance).shape[1]
+def n_systems(system: System) -> int:
+    """Return the number of systems that `medium_spread` runs."""
+    n = covariance_root(capability(system, Uncertain).covariance).shape[1]
     return 1 + 2 * n + n * (n - 1) // 2
 
 
@@ -66,14 +68,14 @@ def sigma_points(
     pair of directions, by their numbers. Refusal if one is no system a standard deviation away: the covariance then
     allows impossible media."""
     try:
-        return _points(scene, DEVIATIONS)
+        return _sigma_points_at(scene, DEVIATIONS)
     except Refusal:
-        return _points(scene, 1.0)
+        return _sigma_points_at(scene, 1.0)
 
 
-def _points(scene: Scene, deviations: float):
+def _sigma_points_at(scene: Scene, deviations: float):
     system = capability(scene.system, Uncertain)
-    steps = deviations * root(system.covariance).T
+    steps = deviations * covariance_root(system.covariance).T
     pairs = itertools.combinations(range(len(steps)), 2)
     with located(scene.name):
         near = [(system.varied(s), system.varied(-s)) for s in steps]
@@ -84,7 +86,7 @@ def _points(scene: Scene, deviations: float):
         )
 
 
-def of_medium(
+def medium_spread(
     scene: Scene, gait: Gait, amplitudes
 ) -> dict[str, np.ndarray | list[str]] | None:
     """Return standard deviations of the net pose by the medium; None for a certain medium. Refusal as of
@@ -97,16 +99,16 @@ def of_medium(
     The deviation of the net distance is that of the position along the net displacement, which has no kink at 0; where
     the distance is smaller than the deviation of the whole position, it is the latter."""
     system = scene.system
-    if not uncertain(system):
+    if not is_uncertain(system):
         return None
     deviations, near, both = sigma_points(scene)
-    mid = _moved(system, gait, amplitudes)
-    sides = [[_moved(s, gait, amplitudes) for s in pair] for pair in near]
+    mid = _net_poses(system, gait, amplitudes)
+    sides = [[_net_poses(s, gait, amplitudes) for s in pair] for pair in near]
     along = lambda change: _with_distance(mid, change)
     slopes = [along((p - m) / (2 * deviations)) for p, m in sides]
     curves = [along((p + m - 2 * mid) / deviations**2) for p, m in sides]
     mixed = [
-        along(_moved(s, gait, amplitudes) - sides[i][0] - sides[j][0] + mid)
+        along(_net_poses(s, gait, amplitudes) - sides[i][0] - sides[j][0] + mid)
         for (i, j), s in both.items()
     ]
     bends = [c / np.sqrt(2) for c in curves] + [c / deviations**2 for c in mixed]
@@ -116,12 +118,12 @@ def of_medium(
     )
     size = np.array([body_size(system), body_size(system), 1.0])
     bent = (linear + more > NONLINEAR**2 * linear)[:, :3] & (
-        np.sqrt((linear + more)[:, :3]) / size > SEEN
+        np.sqrt((linear + more)[:, :3]) / size > SMALLEST_SPREAD
     )
     variance = linear + np.where(bent.any(1)[:, None], more, 0.0)
     spread = dict(zip(QUANTITIES, np.sqrt(variance).T))
     spread["position"] = np.hypot(spread["x"], spread["y"])
-    far = of_pose(mid)["net_distance"] >= spread["position"]
+    far = pose_quantities(mid)["net_distance"] >= spread["position"]
     spread["net_distance"] = np.where(far, spread["net_distance"], spread["position"])
     shift = sum(curves, np.zeros((len(mid), 4))) / 2
     rule = ["second order" if b else "linear" for b in bent.any(1)]
@@ -131,12 +133,13 @@ def of_medium(
 def _with_distance(poses: np.ndarray, change: np.ndarray) -> np.ndarray:
     """Return changes (B, 3) of net poses (B, 3) with the change along the net displacement, QUANTITIES (B, 4)."""
     direction = (
-        poses[:, :2] / np.maximum(of_pose(poses)["net_distance"], 1e-300)[:, None]
+        poses[:, :2]
+        / np.maximum(pose_quantities(poses)["net_distance"], 1e-300)[:, None]
     )
     return np.column_stack([change, (change[:, :2] * direction).sum(1)])
 
 
-def _moved(system: System, gait: Gait, amplitudes) -> np.ndarray:
+def _net_poses(system: System, gait: Gait, amplitudes) -> np.ndarray:
     """Return net poses (B, 3)."""
     phases = max(PHASES, 8 * gait.harmonics)
     run = lambda amplitudes: system.run(*gait.cycle(phases, amplitudes)).net

@@ -21,7 +21,7 @@ from geomech.run.runner import runner
 from geomech.scenes import write as written
 from geomech.scenes.walker import WalkerScene
 from geomech.studies.grid import Grid
-from geomech.studies.settings import Measured
+from geomech.studies.settings import Measurements
 from rft.core.metres import GRAVITY
 from rft.core.refusal import Refusal, located
 from rft.terradynamics.walking import Mjcf, Rhex, Roller, Walk, engine
@@ -354,12 +354,12 @@ class Walks:
         last = grid.total - 1
         stride = max(1, grid.total // 200)
         for k in {*range(0, grid.total, stride), last}:
-            point_scene = grid.at(grid.points[k])
+            point_scene = grid.scene_factory(grid.points[k])
             if k in (0, last):
                 refuse_engine(point_scene)
         return grid
 
-    def together(self, scene: WalkerScene) -> int:
+    def batch_size(self, scene: WalkerScene) -> int:
         # Other engines walk one robot after the other, which also shows progress.
         return BATCH if scene.engine == "planar" else 1
 
@@ -378,7 +378,7 @@ class Walks:
         """Return the cost of the grid, as if all points were like its dearer end."""
         costs = []
         for k in (0, grid.total - 1):
-            scene = grid.at(grid.points[k])
+            scene = grid.scene_factory(grid.points[k])
             costs.append(walk_cost(scene, grid.total, settling=True))
         return max(costs, key=lambda cost: cost.seconds)
 
@@ -428,7 +428,7 @@ class Settings:
         steps = round(one.steps * shares / 2)
         return WalkCost(balances, seconds, BASE, seconds, steps)
 
-    def prepared(self) -> Settings:
+    def with_shared_data(self) -> Settings:
         scene = self.scene
         chosen = engine(scene.engine)
         (walk,) = chosen.walk([scene.walker], scene.numerics, SETTLING)
@@ -443,7 +443,7 @@ class Settings:
             found.append(setting)
         return found
 
-    def numbers(self, setting: Setting, value: Any) -> list[np.ndarray]:
+    def evaluate(self, setting: Setting, value: Any) -> list[np.ndarray]:
         """Return the speed with one setting at another value, `FINEST` for None."""
         scene = self.scene
         if value is None:
@@ -458,7 +458,7 @@ class Settings:
     ) -> dict[str, float]:
         return {"error": float(abs(numbers[0] - truth[0]))}
 
-    def choices(self, measured: Measured) -> list[Variable]:
+    def choices(self, measured: Measurements) -> list[Variable]:
         """Return, for each tolerance and setting, the coarsest value from which on the
         error is within the tolerance, nan if there is none; and the speed."""
         coarsest = np.full((len(measured.settings), len(TOLERANCES)), np.nan)
