@@ -13,9 +13,9 @@ from scipy.optimize import fsolve
 
 from figures import main, style
 from geomech import plots
-from geomech.gaits import Circle
-from geomech.geometry import connection
-from geomech.tiers.direct import direct
+from geomech.mathematics.gaits import Circle
+from geomech.mathematics.geometry import connection
+from geomech.mathematics.tiers.direct import direct
 from rft import CATALOGUE, Chain, body_velocity
 from rft.balance import backend
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from figures import main, style
 from geomech import plots
-from geomech.studies.calibration import rod_fit
+from geomech.studies.terradynamics.calibration import rod_fit
 from rft import CATALOGUE, Viscous
 
 LAWS = {  # law, colour, label

@@ -31,9 +31,9 @@ import numpy as np
 
 from figures import main, style
 from geomech import plots
-from geomech.gaits import Sine
+from geomech.mathematics.gaits import Sine
 from geomech.scenes import load
-from geomech.studies import undulation
+from geomech.studies.mechanics import undulation
 
 SCENES = {
     "sandfish-loose": style.LOOSE,

@@ -2,7 +2,7 @@
 that holds against the sand.
 
 The sign of the moment is taken for the side that works, as in Sec. III C
-(`geomech.studies.undulation.activation`), for a plain body at the animal's amplitude in
+(`geomech.studies.mechanics.undulation.activation`), for a plain body at the animal's amplitude in
 loose glass; dashed in (d), with the sandfish's head drag.
 
 (a) As Fig. 10(c): lines where the right side starts and stops to work, over the shaded
@@ -31,9 +31,9 @@ import numpy as np
 
 from figures import main, style
 from geomech import plots
-from geomech.gaits import Sine
+from geomech.mathematics.gaits import Sine
 from geomech.scenes import load
-from geomech.studies import undulation
+from geomech.studies.mechanics import undulation
 from rft import Backbone
 
 WAVES = np.linspace(0.5, 1.8, 27)

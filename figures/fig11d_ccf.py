@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from figures import main
 from geomech import plots
-from geomech.gaits import Butterfly
+from geomech.mathematics.gaits import Butterfly
 from geomech.scenes import load
 from geomech.studies.scene_tables import SceneTables
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from figures import main
 from geomech import plots
-from geomech.gaits import Butterfly, Circle
+from geomech.mathematics.gaits import Butterfly, Circle
+from geomech.mathematics.tiers import TIERS
 from geomech.scenes import load
 from geomech.studies.scene_tables import SceneTables
-from geomech.tiers import TIERS
 
 GAITS = {"circle": Circle(reverse=True), "butterfly": Butterfly()}
 AMPLITUDES = {

@@ -14,10 +14,10 @@ import numpy as np
 from figures import main, style
 from geomech import plots
 from geomech.plots import curves
-from geomech.plots.sweeps import parameters
+from geomech.plots.displacement.sweeps import parameters
 from geomech.scenes import load
-from geomech.studies import walking
-from geomech.studies.sweep import sweep
+from geomech.studies.displacement.sweep import sweep
+from geomech.studies.terradynamics import walking
 
 CURVATURES = np.linspace(-1.0, 1.0, 9).tolist()
 FREQUENCIES = [1.0, 2.0, 3.0, 4.0]
@@ -29,7 +29,7 @@ def compute(
     curvatures=CURVATURES, frequencies=FREQUENCIES, rates=RATES, air=AIR
 ) -> dict:
     """Return the walk of Xplorer as it is built in, and legs and flow as
-    `geomech.studies.sweep.sweep` gives them."""
+    `geomech.studies.displacement.sweep.sweep` gives them."""
     xplorer = load("xplorer")
     sandbot = load("sandbot")
     over = {"robot.legs.relative_curvature": curvatures, "gait.frequency": frequencies}

@@ -13,7 +13,7 @@ import numpy as np
 
 from figures import main, style
 from geomech import plots
-from geomech.gaits import Butterfly, Circle
+from geomech.mathematics.gaits import Butterfly, Circle
 from geomech.scenes import load
 from geomech.studies.scene_tables import SceneTables
 

@@ -29,8 +29,8 @@ from figures.campaigns import grains
 from figures.fig08a_rods import rod_forces
 from geomech import plots
 from geomech.scenes import load
-from geomech.studies.calibration import rod_fit
 from geomech.studies.scene_tables import SceneTables
+from geomech.studies.terradynamics.calibration import rod_fit
 from rft import EndCaps, Transient
 from rft.grains.reversal import Recovery, recovery
 from rft.terradynamics.plates import VERTICAL, HalfCylinder, RoundRod

@@ -14,7 +14,8 @@ import numpy as np
 
 from figures import main
 from geomech import plots
-from geomech.geometry import connection, harmonics
+from geomech.mathematics.geometry import connection
+from geomech.mathematics.geometry.representations import harmonics
 from geomech.scenes import load
 
 

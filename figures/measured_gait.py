@@ -13,11 +13,11 @@ import numpy as np
 from figures import main
 from geomech import plots
 from geomech.core.variables import Result
-from geomech.gaits import Ellipse
-from geomech.measured import Log, fit_log, synthetic
-from geomech.measured.results import fit_result
+from geomech.mathematics.gaits import Ellipse
 from geomech.results import show
 from geomech.scenes import load
+from geomech.studies.measured import Log, fit_log, synthetic
+from geomech.studies.measured.results import fit_result
 
 GAIT = Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.2, -0.1))
 JOINTS = ("alpha_1", "alpha_2")

@@ -12,13 +12,13 @@ from __future__ import annotations
 from figures import main
 from geomech import plots
 from geomech.core.variables import Result
-from geomech.measured.midlines.fit import fit_midlines
-from geomech.measured.midlines.predicted import compare
-from geomech.measured.midlines.results import trial_result
-from geomech.measured.midlines.synthetic import synthetic_midlines
+from geomech.mathematics.systems import Swimmer
+from geomech.mathematics.systems.swimmer import MEDIA
 from geomech.results import show
-from geomech.systems import Swimmer
-from geomech.systems.swimmer import MEDIA
+from geomech.studies.measured.midlines.fit import fit_midlines
+from geomech.studies.measured.midlines.predicted import compare
+from geomech.studies.measured.midlines.results import trial_result
+from geomech.studies.measured.midlines.synthetic import synthetic_midlines
 from rft import Backbone
 
 

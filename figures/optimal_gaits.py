@@ -22,9 +22,9 @@ import numpy as np
 
 from figures import main, style
 from geomech import plots
-from geomech.optimisation import optimise
-from geomech.optimisation.limiting import PHASES
 from geomech.scenes import load
+from geomech.studies.optimisation import optimise
+from geomech.studies.optimisation.limiting import PHASES
 
 SCENES = {
     "viscous fluid, ratio 2": "three-link-viscous",

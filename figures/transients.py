@@ -14,9 +14,9 @@ import numpy as np
 
 from figures import main, style
 from geomech import plots
-from geomech.gaits import Sine
+from geomech.mathematics.gaits import Sine
 from geomech.scenes import load
-from geomech.studies.batch import joined_scene
+from geomech.studies.displacement.batch import joined_scene
 from rft import Backbone, Transient
 
 AMPLITUDES = (0.1, 0.22, 0.4)  # A / lambda

@@ -17,7 +17,7 @@ import numpy as np
 from figures import main, style
 from geomech import plots
 from geomech.scenes import load
-from geomech.studies import walking
+from geomech.studies.terradynamics import walking
 from rft.terradynamics.ground import Aeration
 from rft.terradynamics.plates import Polygon
 from rft.terradynamics.plates.outline import Outline

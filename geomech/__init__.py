@@ -26,15 +26,11 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from geomech import face as _face  # noqa: F401  implements methods of values
 from geomech.core import version as _version
+from geomech.shell import face as _face  # noqa: F401  implements methods of values
 
 if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
-    from geomech import gaits as gaits
-    from geomech import measured as measured
     from geomech import plots as plots
-    from geomech import systems as systems
-    from geomech import tiers as tiers
     from geomech.api import Study as Study
     from geomech.api import accuracy as accuracy
     from geomech.api import ccf as ccf
@@ -53,10 +49,13 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech.api import trajectory as trajectory
     from geomech.api import velocity as velocity
     from geomech.api import walk as walk
-    from geomech.geometry import connection as connection
-    from geomech.geometry import curvature as curvature
-    from geomech.geometry import reconstruct as reconstruct
-    from geomech.measured import fit_log as fit_log
+    from geomech.mathematics import gaits as gaits
+    from geomech.mathematics import systems as systems
+    from geomech.mathematics import tiers as tiers
+    from geomech.mathematics.geometry import connection as connection
+    from geomech.mathematics.geometry import curvature as curvature
+    from geomech.mathematics.geometry import reconstruct as reconstruct
+    from geomech.mathematics.systems import Swimmer as Swimmer
     from geomech.results.measured import fitted_gait as fitted_gait
     from geomech.results.scenes import best_scene as best_scene
     from geomech.results.scenes import fitted_medium as fitted_medium
@@ -66,9 +65,10 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech.scenes import load as load
     from geomech.scenes import toml as toml
     from geomech.scenes.kinds import register as register
-    from geomech.scenes.stress import medium as medium
-    from geomech.studies import undulation as undulation
-    from geomech.systems import Swimmer as Swimmer
+    from geomech.scenes.terradynamics.stress import medium as medium
+    from geomech.studies import measured as measured
+    from geomech.studies.measured import fit_log as fit_log
+    from geomech.studies.mechanics import undulation as undulation
     from rft import bodies as bodies
     from rft import effects as effects
     from rft import laws as _laws
@@ -80,16 +80,15 @@ __version__ = _version.VERSION
 
 _MODULES = {  # by their names here; none is imported before its first use
     **{
-        name: f"geomech.geometry.{name}"
+        name: f"geomech.mathematics.geometry.{name}"
         for name in ("connection", "curvature", "reconstruct")
     },
-    **{
-        name: f"geomech.{name}"
-        for name in ("gaits", "measured", "plots", "systems", "tiers")
-    },
+    **{name: f"geomech.mathematics.{name}" for name in ("gaits", "systems", "tiers")},
+    "measured": "geomech.studies.measured",
+    "plots": "geomech.plots",
     **{name: f"rft.{name}" for name in ("bodies", "effects")},
     "media": "rft.laws",
-    "undulation": "geomech.studies.undulation",
+    "undulation": "geomech.studies.mechanics.undulation",
     "workers": "geomech.run.workers",
 }
 _OBJECTS = {
@@ -119,9 +118,9 @@ _OBJECTS = {
     **dict.fromkeys(("best_scene", "fitted_medium"), "geomech.results.scenes"),
     "fitted_gait": "geomech.results.measured",
     **dict.fromkeys(("load", "toml", "Scene", "Numerics"), "geomech.scenes"),
-    "medium": "geomech.scenes.stress",
-    "Swimmer": "geomech.systems",
-    "fit_log": "geomech.measured",
+    "medium": "geomech.scenes.terradynamics.stress",
+    "Swimmer": "geomech.mathematics.systems",
+    "fit_log": "geomech.studies.measured",
     "register": "geomech.scenes.kinds",
     "Refusal": "rft.core.refusal",
 }

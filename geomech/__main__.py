@@ -1,3 +1,3 @@
-from geomech.cli import main
+from geomech.shell.cli import main
 
 main()

@@ -175,7 +175,7 @@ class Study:
         return repr(self.tables)
 
     def _repr_html_(self) -> str:
-        from geomech import notebook
+        from geomech.shell import notebook
 
         return notebook.study(self.tables)
 
@@ -219,7 +219,8 @@ class Study:
         >>> study.animate(pathlib.Path(tempfile.mkdtemp()) / "swim.png").name
         'swim.png'
         """
-        from geomech import films, plots
+        from geomech import plots
+        from geomech.plots import films
 
         path = Path(path)
         if is_film(path):

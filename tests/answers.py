@@ -142,7 +142,7 @@ LEFT_OUT = re.compile(r"seconds|residual|unit|gait\.|answers|evaluations|from_")
 
 def results(line: str) -> list:
     """Return the results that a command prints, in a copy of data/frozen."""
-    from geomech import pipeline
+    from geomech.shell import pipeline
 
     found: list = []
 

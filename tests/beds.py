@@ -4,7 +4,8 @@ import types
 
 import numpy as np
 
-from geomech.studies import grain_swim, grains
+from geomech.studies.grains import drag as grains
+from geomech.studies.grains import swim as grain_swim
 from rft import EndCaps, Granular
 from rft.grains import Experiment, Run
 from rft.grains.motions import Swim

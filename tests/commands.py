@@ -11,9 +11,9 @@ from unittest import mock
 import pytest
 import typer.main
 
-from geomech import cli
 from geomech.run import backend
 from geomech.scenes import kinds
+from geomech.shell import cli
 from rft.balance.backend import preferring
 from rft.core.registry import REGISTRIES
 

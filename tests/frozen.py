@@ -66,10 +66,10 @@ FILES = {
 DOORS = [
     "rft",
     "geomech",
-    "geomech.gaits",
-    "geomech.measured",
+    "geomech.mathematics.gaits",
+    "geomech.studies.measured",
     "geomech.plots",
-    "geomech.systems",
+    "geomech.mathematics.systems",
     "rft.bodies",
     "rft.effects",
 ]

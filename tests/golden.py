@@ -38,9 +38,9 @@ from scipy.spatial.transform import Rotation
 
 import geomech
 import rft
-from geomech import pipeline
+from geomech.mathematics.systems.capabilities import solver_of
 from geomech.run import cost
-from geomech.systems.capabilities import solver_of
+from geomech.shell import pipeline
 from rft.balance import backend
 from rft.terradynamics.meshes import Spatial, wrench
 from rft.terradynamics.plates import loads
@@ -126,7 +126,9 @@ def march(names, cycles=2):
     """Net pose, velocities, power and moments of a march under effects strong enough to matter."""
     body, gait = (
         rft.Chain((1, 1.4, 0.8), frame="link-2"),
-        geomech.gaits.Ellipse(semi_axes=(1.0, 0.6), tilt=0.4, centre=(0.3, -0.2)),
+        geomech.mathematics.gaits.Ellipse(
+            semi_axes=(1.0, 0.6), tilt=0.4, centre=(0.3, -0.2)
+        ),
     )
     effects = [EFFECTS[name][0](0.05) for name in names]
     found = rft.time_steps(

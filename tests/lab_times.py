@@ -13,7 +13,7 @@ from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 
 from geomech import lab, scenes
-from geomech.studies.lab import Lab
+from geomech.studies.maps.lab import Lab
 
 FRAMES = """
 lab.player.playing = false;

@@ -5,9 +5,9 @@ import pathlib
 
 import numpy as np
 
-from geomech.gaits import GAITS as kinds_of_gaits
-from geomech.systems import SYSTEMS as kinds_of_systems
-from geomech.systems import Table
+from geomech.mathematics.gaits import GAITS as kinds_of_gaits
+from geomech.mathematics.systems import SYSTEMS as kinds_of_systems
+from geomech.mathematics.systems import Table
 from rft.bodies import BODIES as kinds_of_bodies
 from rft.effects import EFFECTS as kinds_of_effects
 from rft.laws import CATALOGUE, LAWS, is_closed

@@ -6,10 +6,10 @@ import numpy as np
 from scipy.io import savemat
 
 import rft
-from geomech.geometry import connection, metric
-from geomech.geometry.connection import Connection
-from geomech.geometry.minimum_perturbation import minimum_perturbation
-from geomech.systems import Swimmer
+from geomech.mathematics.geometry import connection, metric
+from geomech.mathematics.geometry.connection import Connection
+from geomech.mathematics.geometry.minimum_perturbation import minimum_perturbation
+from geomech.mathematics.systems import Swimmer
 from rft.formulas import se2
 
 

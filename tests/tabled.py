@@ -6,7 +6,7 @@ import numpy as np
 
 from geomech.core.variables import Result, Variable
 from geomech.io.results import from_dict
-from geomech.tiers import TIERS
+from geomech.mathematics.tiers import TIERS
 
 QUANTITIES = ("x", "y", "heading", "net_distance")
 

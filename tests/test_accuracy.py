@@ -8,12 +8,12 @@ import geomech
 from figures import cost_scaling, work_precision
 from geomech import scenes
 from geomech.core.setting import Setting
-from geomech.gaits import Circle, Ellipse
-from geomech.geometry import connection
-from geomech.studies import tiered
+from geomech.mathematics.gaits import Circle, Ellipse
+from geomech.mathematics.geometry import connection
+from geomech.mathematics.tiers.direct import direct
+from geomech.studies.displacement import tiered
 from geomech.studies.scene_tables import SceneTables
 from geomech.studies.settings import Measurements, choice_variables, padded_array
-from geomech.tiers.direct import direct
 from rft import Chain, Viscous, body_velocity
 
 pytestmark = pytest.mark.usefixtures("fastest")

@@ -24,10 +24,10 @@ from tabled import tabled_json
 from test_hard_cases import GLASS, apart
 
 from geomech import scenes
-from geomech.describe.scene import description
-from geomech.describe.system import system_lines
-from geomech.gaits import Ellipse
-from geomech.systems import solver
+from geomech.mathematics.gaits import Ellipse
+from geomech.mathematics.systems import solver
+from geomech.shell.describe.scene import description
+from geomech.shell.describe.system import system_lines
 from rft import (
     Backbone,
     Chain,

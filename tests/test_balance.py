@@ -7,7 +7,7 @@ import pytest
 from commands import geomech
 from registry import BODIES, CLOSED, DRY, MEDIA
 
-from geomech import symbolic
+from geomech.mathematics import symbolic
 from rft import (
     Chain,
     Coulomb,

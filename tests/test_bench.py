@@ -9,14 +9,14 @@ from registry import BODIES, EFFECTS, GAITS, MEDIA, SYSTEMS
 
 import rft
 from geomech import scenes
-from geomech.gaits import Circle, Fourier, Sine
-from geomech.geometry import connection
+from geomech.mathematics.gaits import Circle, Fourier, Sine
+from geomech.mathematics.geometry import connection
+from geomech.mathematics.systems import Solver, Swimmer
+from geomech.mathematics.systems.base import length_unit
+from geomech.mathematics.systems.capabilities import solver_of
+from geomech.mathematics.systems.framed import in_frame
 from geomech.scenes import Numerics, Scene
 from geomech.studies.scene_tables import SceneTables, refuse_outside
-from geomech.systems import Solver, Swimmer
-from geomech.systems.base import length_unit
-from geomech.systems.capabilities import solver_of
-from geomech.systems.framed import in_frame
 from rft.core.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")

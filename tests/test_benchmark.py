@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 from figures.cost_scaling import NAMES, backends, one_scipy_solve, quickest
-from geomech.gaits import Butterfly, Circle, Sine
-from geomech.geometry import connection
+from geomech.mathematics.gaits import Butterfly, Circle, Sine
+from geomech.mathematics.geometry import connection
+from geomech.mathematics.systems import Solver, Swimmer
+from geomech.mathematics.tiers.direct import direct
 from geomech.scenes import load
 from geomech.studies.scene_tables import SceneTables
-from geomech.systems import Solver, Swimmer
-from geomech.tiers.direct import direct
 from rft import CATALOGUE, Backbone, Chain, Transient, body_velocity, time_steps
 
 pytestmark = pytest.mark.benchmark

@@ -10,7 +10,7 @@ from geomech import scenes
 from geomech.io import tables
 from geomech.io.rows import split_unit
 from geomech.io.tables import matlab
-from geomech.scenes.hints import line_hint
+from geomech.scenes.format.hints import line_hint
 from rft.core.refusal import Refusal
 
 

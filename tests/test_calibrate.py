@@ -11,8 +11,8 @@ from scipy.stats import norm, qmc
 
 from geomech import scenes as scene
 from geomech.io.rows import Rows
-from geomech.scenes import drag
-from geomech.studies import calibration
+from geomech.scenes.data import drag
+from geomech.studies.terradynamics import calibration
 from rft import Coulomb, Granular, Viscous
 from rft.fits.rods import Fit, fit
 from rft.laws.drag import Rod, rod_drag

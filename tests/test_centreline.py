@@ -11,10 +11,10 @@ from tabled import swept_table
 
 from geomech import scenes
 from geomech.core.errors import Note, UnitWarning
-from geomech.gaits import Centreline, Sine
-from geomech.gaits.waves import arc_to_phase
+from geomech.mathematics.gaits import Centreline, Sine
+from geomech.mathematics.gaits.waves import arc_to_phase
+from geomech.studies.displacement.sweep import sweep
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.sweep import sweep
 from rft import Backbone
 from rft.core.refusal import Refusal
 
@@ -367,7 +367,7 @@ def test_file_lies_beside_the_scene(tmp_path, monkeypatch):
 
 
 def test_sweeps_are_taken_up_only_with_the_same_file(tmp_path, monkeypatch):
-    from geomech.studies import cycles, sweep
+    from geomech.studies.displacement import cycles, sweep
 
     toml, partial = scene_in(tmp_path, 12), tmp_path / "partial"
     write(tmp_path / "data", "points", count=12, places=20)

@@ -15,9 +15,9 @@ from tabled import of_json, tabled, tabled_json
 
 from geomech import plots, scenes
 from geomech.core.variables import Result
-from geomech.gaits import Circle, Ellipse
-from geomech.geometry import curvature
 from geomech.io import files
+from geomech.mathematics.gaits import Circle, Ellipse
+from geomech.mathematics.geometry import curvature
 from geomech.questions import run
 from geomech.results.files import load
 from geomech.studies.report import (
@@ -560,7 +560,7 @@ def test_a_scene_comes_through_a_pipe(tmp_path):
 
 def test_the_command_starts_without_the_heavy_libraries():
     heavy = ("numpy", "scipy", "matplotlib", "sympy", "rich.progress")
-    code = f"import sys, geomech.cli; print([m for m in {heavy} if m in sys.modules])"
+    code = f"import sys, geomech.shell.cli; print([m for m in {heavy} if m in sys.modules])"
     assert (
         subprocess.run(
             [sys.executable, "-c", code], capture_output=True, text=True
@@ -598,13 +598,13 @@ def test_commands_load_what_they_use_and_no_more(tmp_path):
     heavy += (
         "rft.terradynamics.walking",
         "rft.terradynamics.meshes",
-        "geomech.scenes.walker",
+        "geomech.scenes.terradynamics.walker",
         "concurrent.futures.process",
         "rich.progress",
     )
     code = f"""if True:
         import os, sys
-        from geomech import cli
+        from geomech.shell import cli
         os.environ["OPENBLAS_NUM_THREADS"] = "7"
         for args in {used!r}:
             try:

@@ -18,7 +18,7 @@ from geomech.run import executors
 from geomech.run.executors import Cluster
 from geomech.run.runner import runner
 from geomech.run.workers import using
-from geomech.studies import cycles, sweep
+from geomech.studies.displacement import cycles, sweep
 from rft.core.refusal import Refusal
 
 distributed = pytest.importorskip(

@@ -13,11 +13,14 @@ from commands import geomech as run
 from scipy.io import netcdf_file
 from tabled import swept_table, tabled_json
 
-from geomech import plots, scenes, terminal
-from geomech.geometry import connection, harmonics
-from geomech.geometry.field import Field
+from geomech import plots, scenes
+from geomech.mathematics.geometry import connection
+from geomech.mathematics.geometry.representations import harmonics
+from geomech.mathematics.geometry.representations.field import Field
 from geomech.run import cost as run_cost
-from geomech.studies import cycles, estimate, sweep
+from geomech.shell import terminal
+from geomech.studies.displacement import cycles, sweep
+from geomech.studies.estimates import estimate
 from geomech.studies.scene_tables import SceneTables
 
 GLASS = scenes.load("three-link-glass")
@@ -137,7 +140,9 @@ def test_large_requests_are_refused_without_yes(name, large, monkeypatch):
         connection, "SAMPLES_TOGETHER", 2000
     )  # three small batches tell
     monkeypatch.setattr(cycles, "BATCH_SIZE", 4)
-    monkeypatch.setattr("geomech.systems.capabilities.VALUES_TOGETHER", 1 << 15)
+    monkeypatch.setattr(
+        "geomech.mathematics.systems.capabilities.VALUES_TOGETHER", 1 << 15
+    )
     before = sorted(p.name for p in large.iterdir())
     code, out, err = run(*LARGE[name])
     assert (code, out) == (2, "")
@@ -240,8 +245,8 @@ def test_pieces_change_no_numbers(monkeypatch):
         ]
 
     whole = everything()
-    monkeypatch.setattr("geomech.systems.capabilities.VALUES_TOGETHER", 1)
-    monkeypatch.setattr("geomech.systems.capabilities.STEPPED_TOGETHER", 1)
+    monkeypatch.setattr("geomech.mathematics.systems.capabilities.VALUES_TOGETHER", 1)
+    monkeypatch.setattr("geomech.mathematics.systems.capabilities.STEPPED_TOGETHER", 1)
     for module in (
         connection,
         *(
@@ -325,8 +330,8 @@ def test_a_signal_stops_the_solvers_threads(large):
     """One batch of half a million balances, solved on both cores: nobody waits for its shares."""
     code = """if True:
         import os, signal, sys, threading, numpy as np
-        from geomech import terminal
-        from geomech.terminal import stoppable
+        from geomech.shell import terminal
+        from geomech.shell.terminal import stoppable
         from rft import Chain, Granular, body_velocity
         shapes = np.random.default_rng(0).uniform(-2, 2, (2, 500_000, 2))
         threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGTERM)).start()
@@ -399,7 +404,7 @@ def test_a_terminal_without_letters_and_a_home_without_folders(tmp_path):
     }
     code = """if True:
         import sys
-        from geomech import cli
+        from geomech.shell import cli
         for args in (
             "displacement/sch\\u00f6n \\u2603.toml/--amplitudes/1/--tiers/direct/--plot/\\u2603.png",
             "explain/\\u2603.toml",
@@ -482,7 +487,8 @@ def test_nobody_need_listen(tmp_path):
     ids=lambda args: " ".join(args[:2]),
 )
 def test_memory_stays_below_what_was_said(args, large):
-    code = "import atexit, resource, sys; from geomech.cli import main; memory = lambda: resource.getrusage(0).ru_maxrss; "
+    code = "import atexit, resource, sys; from geomech.shell.cli import main; "
+    code += "memory = lambda: resource.getrusage(0).ru_maxrss; "
     code += "atexit.register(lambda: print(memory() * 1024, file=sys.stderr)); main(sys.argv[1:])"
     done = subprocess.run(
         [sys.executable, "-c", code, *args, "--yes"], capture_output=True, text=True

@@ -9,14 +9,16 @@ from tabled import swept_table, tabled
 
 import geomech
 from geomech import scenes
-from geomech.gaits import Fourier
+from geomech.mathematics.gaits import Fourier
+from geomech.mathematics.tiers import TIERS
 from geomech.questions.accuracy import Accuracy
 from geomech.questions.ccf import Ccf
 from geomech.questions.run import Run
 from geomech.run.cost import BASE
-from geomech.studies import cost, effort, motion, sweep
+from geomech.studies.displacement import sweep
+from geomech.studies.estimates import cost, effort
+from geomech.studies.mechanics import motion
 from geomech.studies.scene_tables import SceneTables
-from geomech.tiers import TIERS
 from rft import Chain, body_velocity
 from rft.balance.listening import listening
 from rft.effects import SkinFriction, Slope

@@ -7,16 +7,17 @@ import pytest
 import sympy as sp
 import xarray
 
-from geomech import scenes, symbolic
+from geomech import scenes
 from geomech.core.variables import Result, Variable
-from geomech.geometry import connection, curvature
-from geomech.geometry.field import Field
+from geomech.mathematics import symbolic
+from geomech.mathematics.geometry import connection, curvature
+from geomech.mathematics.geometry.representations.field import Field
+from geomech.mathematics.tiers import fitted
 from geomech.questions.ccf import zero_line_words
 from geomech.results import show
-from geomech.studies import fields
+from geomech.studies.maps import fields
+from geomech.studies.maps.shape_space import zero_line
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.shape_space import zero_line
-from geomech.tiers import fitted
 from rft.formulas import se2
 
 pytestmark = pytest.mark.usefixtures("fastest")

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from geomech import scenes
-from geomech.optimisation import build_request
+from geomech.mathematics.systems.solver import Solver
 from geomech.run.digest import Undigestible, digest
-from geomech.studies.effort import _RecordedVelocity
+from geomech.studies.estimates.effort import _RecordedVelocity
+from geomech.studies.optimisation import build_request
 from geomech.studies.scene_tables import SceneTables
-from geomech.systems.solver import Solver
 
 VISCOUS = scenes.load("three-link-viscous")
 A = np.arange(6.0).reshape(2, 3)

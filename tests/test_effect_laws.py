@@ -9,7 +9,7 @@ from registry import BODIES
 from scipy import integrate, optimize
 
 from geomech import scenes
-from geomech.gaits import Circle, Sine
+from geomech.mathematics.gaits import Circle, Sine
 from rft import (
     CATALOGUE,
     Backbone,

@@ -12,11 +12,11 @@ from registry import EFFECTS
 
 from geomech import scenes
 from geomech.core.errors import UnitWarning
-from geomech.describe.scene import description
-from geomech.gaits import Circle, Ellipse, Sine
+from geomech.mathematics.gaits import Circle, Ellipse, Sine
+from geomech.mathematics.systems import Swimmer
+from geomech.shell.describe.scene import description
 from geomech.studies.available import default_tiers
 from geomech.studies.scene_tables import SceneTables
-from geomech.systems import Swimmer
 from rft import (
     CATALOGUE,
     Backbone,

@@ -5,19 +5,20 @@ import pytest
 from tabled import of_json, tabled
 
 import geomech
-from geomech.gaits import Circle, Ellipse
-from geomech.geometry import metric
-from geomech.geometry.connection import Connection
 from geomech.io.results import to_xarray
-from geomech.scenes.frames import framed
-from geomech.studies import cost, effort, fields
-from geomech.studies.scene_tables import SceneTables
-from geomech.systems import NoSlipSnake, Swimmer, Table
-from geomech.systems.capabilities import (
+from geomech.mathematics.gaits import Circle, Ellipse
+from geomech.mathematics.geometry import metric
+from geomech.mathematics.geometry.connection import Connection
+from geomech.mathematics.systems import NoSlipSnake, Swimmer, Table
+from geomech.mathematics.systems.capabilities import (
     refined,
     stored_table,
     velocity_and_power,
 )
+from geomech.scenes.frames import framed
+from geomech.studies.estimates import cost, effort
+from geomech.studies.maps import fields
+from geomech.studies.scene_tables import SceneTables
 from rft import (
     BodyInertia,
     Chain,
@@ -184,7 +185,9 @@ def test_what_has_no_metric_says_why(system, said):
     gait = (
         Circle()
         if system.joints == 2
-        else geomech.gaits.Fourier(cos=((1,), (0,), (0,)), sin=((0,), (1,), (0.5,)))
+        else geomech.mathematics.gaits.Fourier(
+            cos=((1,), (0,), (0,)), sin=((0,), (1,), (0.5,))
+        )
     )
     study = SceneTables(scene(system, gait))
     with pytest.raises(Refusal, match=said):
@@ -259,7 +262,7 @@ def test_what_it_takes_is_foretold(medium, body):
 
 
 def test_by_command(capsys):
-    from geomech.cli import main
+    from geomech.shell.cli import main
 
     with pytest.raises(SystemExit) as ended:
         main(
@@ -290,7 +293,7 @@ def test_by_command(capsys):
 
 @pytest.mark.parametrize("name", ["three-link-floating", "three-link-ideal-fluid"])
 def test_a_metric_of_the_systems_own_has_lengths_and_no_work(name, capsys):
-    from geomech.cli import main
+    from geomech.shell.cli import main
 
     study = SceneTables(geomech.load(name).with_numerics(grid=31, extent=2.5))
     alpha, alphadot = study.scene.gait.cycle(256, 0.8)

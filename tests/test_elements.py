@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 import rft
-from geomech.gaits import Circle, Fourier, Sine
-from geomech.optimisation.evaluate import evaluate_gait
-from geomech.optimisation.request import build_request
+from geomech.mathematics.gaits import Circle, Fourier, Sine
+from geomech.mathematics.systems import Swimmer
+from geomech.mathematics.systems.swimmer import MEDIA
 from geomech.scenes.model import Scene
-from geomech.studies import estimate
-from geomech.studies.choose import cheapest_displacements
-from geomech.studies.effort import effort
+from geomech.studies.displacement.choose import cheapest_displacements
+from geomech.studies.estimates import estimate
+from geomech.studies.estimates.effort import effort
+from geomech.studies.optimisation.evaluate import evaluate_gait
+from geomech.studies.optimisation.request import build_request
 from geomech.studies.scene_tables import SceneTables
-from geomech.systems import Swimmer
-from geomech.systems.swimmer import MEDIA
 from rft.bodies import Backbone, ConstantCurvature, Positions, Serpenoid
 from rft.effects import Transient
 

@@ -9,8 +9,8 @@ import pytest
 from commands import geomech
 
 import rft
-from geomech import cli
-from geomech.studies import effort
+from geomech.shell import cli
+from geomech.studies.estimates import effort
 
 SMALL = """[medium]\nname = "glass-0.3mm-loose"\n[body]\nkind = "chain"\nlengths = [1, 1.4, 0.8]\n
 [gait]\nkind = "ellipse"\nsemi_axes = [0.8, 0.5]\n[numerics]\ngrid = 7\nphases = 32\nharmonics = 5\nextent = 2.0\n"""

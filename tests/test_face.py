@@ -12,7 +12,15 @@ from numpy.testing import assert_allclose
 import geomech
 import rft
 from geomech import Refusal, Study, plots
-from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Points, Sine, Wave
+from geomech.mathematics.gaits import (
+    Butterfly,
+    Circle,
+    Ellipse,
+    Fourier,
+    Points,
+    Sine,
+    Wave,
+)
 from geomech.scenes.parts import as_scene
 
 SAND, CHAIN = rft.Granular(1.8, 0.24), rft.Chain((1, 1, 1))
@@ -252,4 +260,4 @@ def test_a_velocity_of_four_joints_is_not_taken_for_one_of_two():
     with pytest.raises(Refusal, match="joints"):
         geomech.study("three-link-viscous", joints=2)
     with pytest.raises(Refusal, match=r"moves 2 joints but .* has 4"):
-        geomech.study(four, geomech.gaits.Circle(), joints=4)
+        geomech.study(four, geomech.mathematics.gaits.Circle(), joints=4)

@@ -10,14 +10,14 @@ from tabled import of_json
 
 import geomech
 from geomech.core.variables import Variable
-from geomech.gaits import Centreline, Circle, Sine, Wave
-from geomech.geometry.reconstruct import poses
+from geomech.mathematics.gaits import Centreline, Circle, Sine, Wave
+from geomech.mathematics.geometry.reconstruct import poses
+from geomech.mathematics.systems import Swimmer
 from geomech.questions.forces import power_words
 from geomech.scenes import Scene
 from geomech.scenes.frames import framed
-from geomech.studies.forces import answer, check, cost, forces
-from geomech.studies.newtons import Sizes
-from geomech.systems import Swimmer
+from geomech.studies.mechanics.forces import answer, check, cost, forces
+from geomech.studies.mechanics.newtons import Sizes
 from rft import (
     Backbone,
     Chain,

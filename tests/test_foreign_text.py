@@ -12,13 +12,14 @@ from test_mjcf import CART
 from test_mjcf import SCENE as WALKER
 
 import geomech as package
-from geomech import notebook, scenes
-from geomech.describe.scene import description
+from geomech import scenes
 from geomech.io import files, tables
 from geomech.io.tables.mat import ABOUT
 from geomech.run import progress
 from geomech.scenes import Numerics, Scene
-from geomech.studies import fields
+from geomech.shell import notebook
+from geomech.shell.describe.scene import description
+from geomech.studies.maps import fields
 from geomech.studies.scene_tables import SceneTables
 from rft.core import refusal as errors
 

@@ -10,8 +10,8 @@ import tomllib
 import frozen
 import pytest
 
-from geomech import films
-from geomech.geometry import connection
+from geomech.mathematics.geometry import connection
+from geomech.plots import films
 from geomech.run import cost
 
 pytestmark = pytest.mark.usefixtures("fastest")

@@ -5,11 +5,18 @@ import pytest
 from registry import GAITS
 
 from geomech.core.errors import Note
-from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Points, Polygon
-from geomech.geometry.gait import loop_area
+from geomech.mathematics.gaits import (
+    Butterfly,
+    Circle,
+    Ellipse,
+    Fourier,
+    Points,
+    Polygon,
+)
+from geomech.mathematics.geometry.gait import loop_area
 from geomech.scenes import load
 from geomech.scenes.model import Scene
-from geomech.studies import estimate
+from geomech.studies.estimates import estimate
 from rft.formulas import se2
 
 T = np.linspace(0, 2 * np.pi, 33)

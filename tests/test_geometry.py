@@ -9,15 +9,15 @@ from registry import GAITS, MEDIA
 from scipy.special import ndtri
 from scipy.stats import qmc
 
-from geomech import symbolic
-from geomech.gaits import Circle, Ellipse, Fourier
-from geomech.geometry import connection, coordinates, curvature, reconstruct
-from geomech.geometry.field import Field
-from geomech.geometry.traits import Traits
+from geomech.mathematics import symbolic
+from geomech.mathematics.gaits import Circle, Ellipse, Fourier
+from geomech.mathematics.geometry import connection, coordinates, curvature, reconstruct
+from geomech.mathematics.geometry.representations.field import Field
+from geomech.mathematics.geometry.traits import Traits
+from geomech.mathematics.tiers.area import area
+from geomech.mathematics.tiers.direct import direct
+from geomech.mathematics.tiers.path import path
 from geomech.scenes import load
-from geomech.tiers.area import area
-from geomech.tiers.direct import direct
-from geomech.tiers.path import path
 from rft import Chain, Serpenoid, Viscous, body_velocity
 from rft.formulas import se2
 

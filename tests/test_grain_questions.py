@@ -14,9 +14,10 @@ from geomech.questions.drag_grains import DragGrains
 from geomech.questions.grains import Grains
 from geomech.results import show
 from geomech.run.backend import prefer, prefer_for, preferred
-from geomech.scenes import drag
-from geomech.studies import grain_swim, grains
-from geomech.studies.calibration import rod_fit
+from geomech.scenes.data import drag
+from geomech.studies.grains import drag as grains
+from geomech.studies.grains import swim as grain_swim
+from geomech.studies.terradynamics.calibration import rod_fit
 from rft import EndCaps, Granular
 from rft.effects.transient import AT_ONCE, AT_ONCE_ALONG, RATIO
 from rft.fits.rods import fit

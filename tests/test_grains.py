@@ -506,7 +506,7 @@ def test_three_links_swim_in_grains_as_the_law_of_their_flank_says(tmp_path):
     """A circle of 1 rad, one cycle in one bed: 0.11 body lengths +- .02; some four minutes of computing."""
     from geomech.questions.grains import Grains
     from geomech.scenes import load
-    from geomech.studies.grain_swim import GRAINS_LAW
+    from geomech.studies.grains.swim import GRAINS_LAW
 
     result = Grains(load("three-link-glass"), cycles=1, store=tmp_path).ask()
     distance = dict(

@@ -11,7 +11,7 @@ from registry import GROUND_EFFECTS, OUTLINES, STRESSES
 
 from figures import ground_effects
 from geomech import scenes
-from geomech.describe.scene import description
+from geomech.shell.describe.scene import description
 from rft.terradynamics.ground import GROUND_EFFECTS as KINDS
 from rft.terradynamics.ground import (
     Aeration,

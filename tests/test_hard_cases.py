@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from registry import BODIES, CLOSED, DRY, LINEAR, MEDIA
 
-from geomech.gaits import Butterfly, Circle, Fourier
-from geomech.geometry import coordinates
-from geomech.tiers.direct import direct
+from geomech.mathematics.gaits import Butterfly, Circle, Fourier
+from geomech.mathematics.geometry import coordinates
+from geomech.mathematics.tiers.direct import direct
 from rft import CATALOGUE, Chain, Coulomb, Granular, Viscous, body_velocity
 from rft.balance import backend
 from rft.balance.solver import QUICK, Accuracy, solve

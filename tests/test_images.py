@@ -7,11 +7,17 @@ import numpy as np
 import pytest
 from registry import BODIES, GAITS
 
-from geomech.gaits import Butterfly, Circle, Fourier, Sine
-from geomech.geometry import connection, harmonics
-from geomech.geometry.images import cycle_images, images, solved_count, to_solve
-from geomech.geometry.traits import NOTHING, Traits
-from geomech.systems.swimmer import Swimmer
+from geomech.mathematics.gaits import Butterfly, Circle, Fourier, Sine
+from geomech.mathematics.geometry import connection
+from geomech.mathematics.geometry.representations import harmonics
+from geomech.mathematics.geometry.representations.images import (
+    cycle_images,
+    images,
+    solved_count,
+    to_solve,
+)
+from geomech.mathematics.geometry.traits import NOTHING, Traits
+from geomech.mathematics.systems.swimmer import Swimmer
 from rft import CATALOGUE, Chain, EndCaps, GrainInertia, SkinFriction
 from rft.bodies.base import is_reversible
 from rft.laws.base import TermLaw, is_odd
@@ -135,7 +141,7 @@ def test_axes_and_directions_that_do_not_match():
 def test_the_table_says_what_it_took():
     """Foreseen balances are those that are solved."""
     from geomech import scenes
-    from geomech.tiers import fitted, harmonic
+    from geomech.mathematics.tiers import fitted, harmonic
 
     for name in ("three-link-glass", "butterfly-glass"):
         scene = scenes.load(name).with_numerics(grid=7)
@@ -284,7 +290,9 @@ class Late(Fourier):
 @pytest.mark.parametrize("name", symmetric_gaits())
 def test_few_phases_tell_how_many_are_solved(name, monkeypatch):
     """Of gaits that begin anywhere, at numbers of phases of all remainders: images lie on phases of some of these only."""
-    monkeypatch.setattr("geomech.geometry.images.SAMPLED_PHASES", 32)
+    monkeypatch.setattr(
+        "geomech.mathematics.geometry.representations.images.SAMPLED_PHASES", 32
+    )
     gait, shares = symmetric_gaits()[name], []
     for traits in (NOTHING, MIRROR, BACKWARDS, BOTH):
         share = 0

@@ -14,11 +14,11 @@ from test_fuzz import VALUES, mutated
 import geomech.scenes as scenes
 from geomech import medium, plots
 from geomech.core.setting import Setting
-from geomech.scenes.intruder import IntruderScene
-from geomech.studies import intrusion
-from geomech.studies.intrusion import Settings, answer, estimate
+from geomech.scenes.terradynamics.intruder import IntruderScene
 from geomech.studies.scene_tables import SceneTables
 from geomech.studies.settings import Measurements
+from geomech.studies.terradynamics import intrusion
+from geomech.studies.terradynamics.intrusion import Settings, answer, estimate
 from rft.core.refusal import Refusal
 from rft.terradynamics.plates import (
     VERTICAL,

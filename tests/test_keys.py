@@ -19,11 +19,11 @@ from geomech.scenes import (
     parse,
     walker_names,
 )
-from geomech.scenes.key import Key, aliases, keys_of, meanings
-from geomech.scenes.keys import SCENES, all_variants, sections, worded
+from geomech.scenes.format.key import Key, aliases, keys_of, meanings
+from geomech.scenes.format.keys import SCENES, all_variants, sections, worded
+from geomech.scenes.format.schema import schema
+from geomech.scenes.format.sections import file_sections, keys_in
 from geomech.scenes.model import Scene
-from geomech.scenes.schema import schema
-from geomech.scenes.sections import file_sections, keys_in
 from rft import CATALOGUE
 from rft.core.refusal import Refusal
 from rft.laws import LAWS

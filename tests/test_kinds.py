@@ -16,21 +16,21 @@ from commands import geomech
 from registry import EFFECTS
 from tabled import of_json, tabled, tabled_json
 
-from geomech import cli
 from geomech.core.entry_points import installed_entries
-from geomech.describe.scene import description
-from geomech.describe.system import notes
-from geomech.gaits import KINDS as GAITS
-from geomech.gaits import Circle, Gait, Sine
-from geomech.geometry.traits import Traits
+from geomech.mathematics.gaits import KINDS as GAITS
+from geomech.mathematics.gaits import Circle, Gait, Sine
+from geomech.mathematics.geometry.traits import Traits
+from geomech.mathematics.systems import Premise, Solver, Swimmer, capability
+from geomech.mathematics.systems.capabilities import Recorded
 from geomech.scenes import Numerics, Scene, kinds, load, parse, toml
-from geomech.scenes.keys import text
+from geomech.scenes.format.keys import text
+from geomech.scenes.format.schema import schema
 from geomech.scenes.kinds import load_file, register
-from geomech.scenes.schema import schema
-from geomech.studies import estimate
+from geomech.shell import cli
+from geomech.shell.describe.scene import description
+from geomech.shell.describe.system import notes
+from geomech.studies.estimates import estimate
 from geomech.studies.scene_tables import SceneTables
-from geomech.systems import Premise, Solver, Swimmer, capability
-from geomech.systems.capabilities import Recorded
 from rft import Backbone, Chain, Coulomb, EndCaps, Granular, Viscous, body_velocity
 from rft.core.refusal import Refusal
 from rft.core.registry import REGISTRIES
@@ -529,10 +529,10 @@ def test_digests_of_own_code_cover_its_sources(name, tmp_path, monkeypatch):
 SCRIPT = """
 import sys
 import numpy as np
-from geomech.gaits import Circle
+from geomech.mathematics.gaits import Circle
 from geomech.scenes import Scene, kinds
-from geomech.studies import cycles, sweep
-from geomech.systems import SYSTEMS
+from geomech.studies.displacement import cycles, sweep
+from geomech.mathematics.systems import SYSTEMS
 
 def drift(alpha, alphadot):
     a, rates = np.broadcast_arrays(alpha, alphadot)

@@ -20,13 +20,13 @@ import pytest
 from commands import geomech
 
 from geomech import lab, scenes
-from geomech.describe.lab import lines
-from geomech.gaits import Butterfly, Circle, Points
+from geomech.mathematics.gaits import Butterfly, Circle, Points
+from geomech.mathematics.systems.framed import NAME as MINIMUM_PERTURBATION
 from geomech.scenes.write import text_of, without_gait
-from geomech.studies import charts
-from geomech.studies.lab import GALLERY, Lab
+from geomech.shell.describe.lab import lines
+from geomech.studies.maps import charts
+from geomech.studies.maps.lab import GALLERY, Lab
 from geomech.studies.scene_tables import SceneTables
-from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
 from rft.core.refusal import Refusal
 
 pytestmark = [
@@ -236,7 +236,7 @@ def test_the_command(tmp_path):
 
 def test_without_a_file_a_browser_opens_the_gallery(monkeypatch, tmp_path):
     opened = []
-    monkeypatch.setattr("geomech.studies.lab.GALLERY", GALLERY[3:4])
+    monkeypatch.setattr("geomech.studies.maps.lab.GALLERY", GALLERY[3:4])
     monkeypatch.setattr("webbrowser.open", opened.append)
     monkeypatch.setattr("tempfile.mkdtemp", lambda prefix: str(tmp_path))
     code, out, _ = geomech("lab")
@@ -500,7 +500,7 @@ def test_files_and_back(opened, page):
     python = opened.execute_script(
         "return document.getElementById('python').textContent"
     )
-    assert "from geomech.gaits import Butterfly" in python
+    assert "from geomech.mathematics.gaits import Butterfly" in python
     until(lambda: opened.current_url.endswith(before))
     opened.refresh()  # the state is in the address
     assert state(opened) == before

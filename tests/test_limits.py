@@ -10,16 +10,17 @@ import pytest
 from loads import element_load
 from registry import GAITS
 
-from geomech.gaits import Butterfly, Circle, Ellipse, Points, Sine
-from geomech.geometry import connection, family, harmonics
-from geomech.geometry.field import Field
-from geomech.optimisation.objectives import Objective
+from geomech.mathematics.gaits import Butterfly, Circle, Ellipse, Points, Sine
+from geomech.mathematics.geometry import connection, family
+from geomech.mathematics.geometry.representations import harmonics
+from geomech.mathematics.geometry.representations.field import Field
+from geomech.mathematics.systems import Swimmer
+from geomech.mathematics.tiers import fitted
+from geomech.mathematics.tiers.base import Numerics
+from geomech.mathematics.tiers.direct import direct
+from geomech.mathematics.tiers.path import path
 from geomech.questions.fit_gait import FitGait
-from geomech.systems import Swimmer
-from geomech.tiers import fitted
-from geomech.tiers.base import Numerics
-from geomech.tiers.direct import direct
-from geomech.tiers.path import path
+from geomech.studies.optimisation.local.objectives import Objective
 from rft import (
     Backbone,
     BodyInertia,

@@ -5,10 +5,10 @@ import pytest
 
 import geomech
 import rft
-from geomech.gaits import GAITS
-from geomech.geometry import connection, coordinates, curvature, reconstruct
+from geomech.mathematics.gaits import GAITS
+from geomech.mathematics.geometry import connection, coordinates, curvature, reconstruct
+from geomech.mathematics.systems import SYSTEMS, as_system
 from geomech.studies.scene_tables import SceneTables
-from geomech.systems import SYSTEMS, as_system
 from rft.core.refusal import Refusal
 from rft.formulas import se2
 from rft.laws import LAWS
@@ -81,7 +81,9 @@ def test_a_mask_that_hides_nothing_is_none():
 def test_what_a_velocity_masks_is_singular_where_singular_shapes_are_allowed():
     class Hidden:
         joints = 1
-        traits = geomech.systems.base.Traits(singularity=lambda alpha: alpha[..., 0])
+        traits = geomech.mathematics.systems.base.Traits(
+            singularity=lambda alpha: alpha[..., 0]
+        )
 
         def velocity(self, alpha, alphadot):
             xi = np.concatenate([alphadot, alphadot, alphadot], -1)

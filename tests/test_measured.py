@@ -20,19 +20,32 @@ from tabled import of_json, tabled
 import geomech
 import rft
 from figures import measured_gait
-from geomech import gaits, measured
 from geomech.core.errors import Note, UnitWarning
-from geomech.describe.scene import description
-from geomech.geometry import connection
-from geomech.geometry.connection import Connection
-from geomech.geometry.curvature import ccf
-from geomech.geometry.plane import interpolated_plane
-from geomech.geometry.reconstruct import displacement
-from geomech.geometry.tube import Loop, TaylorSeries, Tube, series, waves
 from geomech.io import tables
 from geomech.io.results import write_netcdf
 from geomech.io.tables.mat import ERROR
-from geomech.measured import (
+from geomech.mathematics import gaits
+from geomech.mathematics.geometry import connection
+from geomech.mathematics.geometry.connection import Connection
+from geomech.mathematics.geometry.curvature import ccf
+from geomech.mathematics.geometry.reconstruct import displacement
+from geomech.mathematics.geometry.representations.plane import interpolated_plane
+from geomech.mathematics.geometry.representations.tube import (
+    Loop,
+    TaylorSeries,
+    Tube,
+    series,
+    waves,
+)
+from geomech.mathematics.systems import Swimmer, Table
+from geomech.mathematics.systems.base import length_unit
+from geomech.mathematics.systems.capabilities import stored_table, table_error
+from geomech.results.measured import scene_text
+from geomech.scenes import Scene, load
+from geomech.shell.describe.scene import description
+from geomech.studies import measured
+from geomech.studies.maps import fields
+from geomech.studies.measured import (
     cycles,
     phase,
     plausibility,
@@ -42,19 +55,13 @@ from geomech.measured import (
     synthetic,
     unknowns,
 )
-from geomech.measured import fit as fitted_parts
-from geomech.measured import log as measured_log
-from geomech.measured import residual as measured_residual
-from geomech.measured import spread as measured_spread
-from geomech.optimisation import optimise
-from geomech.results.measured import scene_text
-from geomech.scenes import Scene, load
-from geomech.studies import fields
+from geomech.studies.measured import fit as fitted_parts
+from geomech.studies.measured import log as measured_log
+from geomech.studies.measured import residual as measured_residual
+from geomech.studies.measured import spread as measured_spread
+from geomech.studies.mechanics.single import diagnosed_velocity
+from geomech.studies.optimisation import optimise
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.single import diagnosed_velocity
-from geomech.systems import Swimmer, Table
-from geomech.systems.base import length_unit
-from geomech.systems.capabilities import stored_table, table_error
 from rft.core.refusal import Refusal
 from rft.formulas import se2
 

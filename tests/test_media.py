@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from registry import DRY, MEDIA
 
-from geomech.gaits import Circle
-from geomech.studies.undulation import endless_efficiency
+from geomech.mathematics.gaits import Circle
+from geomech.studies.mechanics.undulation import endless_efficiency
 from rft import (
     CATALOGUE,
     Chain,

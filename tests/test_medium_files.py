@@ -10,8 +10,8 @@ from commands import geomech
 from tabled import tabled_json
 
 from geomech import scenes as scene
+from geomech.studies.displacement.sweep import sweep
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.sweep import sweep
 from rft import Chain, Granular, Table, body_velocity
 from rft.core.refusal import Refusal
 from rft.laws.base import require_drag

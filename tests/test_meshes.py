@@ -18,9 +18,9 @@ from test_intrude import outcome, refused
 import geomech.scenes as scenes
 from figures import meshes
 from geomech import plots
-from geomech.describe.scene import description
 from geomech.scenes import MeshScene
-from geomech.studies.intrusion import answer
+from geomech.shell.describe.scene import description
+from geomech.studies.terradynamics.intrusion import answer
 from rft.core.refusal import Refusal
 from rft.terradynamics.meshes import (
     SOLIDS,

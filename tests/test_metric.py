@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from geomech.gaits import Circle, Ellipse
-from geomech.geometry import connection, metric
-from geomech.systems import Swimmer
+from geomech.mathematics.gaits import Circle, Ellipse
+from geomech.mathematics.geometry import connection, metric
+from geomech.mathematics.systems import Swimmer
 from rft import Chain, Granular, Viscous
 
 pytestmark = pytest.mark.usefixtures("fastest")

@@ -16,9 +16,14 @@ from tabled import of_json
 
 import geomech
 from geomech.core.errors import Note
-from geomech.gaits import Sine
-from geomech.geometry.reconstruct import displacement
-from geomech.measured.midlines import (
+from geomech.mathematics.gaits import Sine
+from geomech.mathematics.geometry.reconstruct import displacement
+from geomech.mathematics.systems import Swimmer
+from geomech.mathematics.systems.swimmer import MEDIA
+from geomech.questions import trials
+from geomech.results import show
+from geomech.scenes import Numerics, Scene
+from geomech.studies.measured.midlines import (
     fit,
     intervals,
     kinematics,
@@ -28,14 +33,9 @@ from geomech.measured.midlines import (
     smooth,
     synthetic,
 )
-from geomech.measured.midlines.kinematics import QUANTITIES
-from geomech.measured.midlines.trial import Trial
-from geomech.questions import trials
-from geomech.results import show
-from geomech.scenes import Numerics, Scene
-from geomech.studies.undulation import performance
-from geomech.systems import Swimmer
-from geomech.systems.swimmer import MEDIA
+from geomech.studies.measured.midlines.kinematics import QUANTITIES
+from geomech.studies.measured.midlines.trial import Trial
+from geomech.studies.mechanics.undulation import performance
 from rft import Backbone, Viscous
 from rft.core.refusal import Refusal
 

@@ -7,15 +7,18 @@ import pytest
 from commands import geomech
 
 from geomech import scenes
-from geomech.gaits import Circle, Ellipse
-from geomech.geometry import connection, coordinates, curvature
-from geomech.geometry.field import Field
-from geomech.geometry.minimum_perturbation import Basis, minimum_perturbation
+from geomech.mathematics.gaits import Circle, Ellipse
+from geomech.mathematics.geometry import connection, coordinates, curvature
+from geomech.mathematics.geometry.minimum_perturbation import (
+    Basis,
+    minimum_perturbation,
+)
+from geomech.mathematics.geometry.representations.field import Field
+from geomech.mathematics.systems import NoSlipSnake, Swimmer
+from geomech.mathematics.tiers.area import area
+from geomech.mathematics.tiers.direct import direct
+from geomech.mathematics.tiers.path import path
 from geomech.studies.scene_tables import SceneTables
-from geomech.systems import NoSlipSnake, Swimmer
-from geomech.tiers.area import area
-from geomech.tiers.direct import direct
-from geomech.tiers.path import path
 from rft import Chain, ConstantCurvature, Granular, Serpenoid, Viscous
 from rft.bodies.base import body_size
 from rft.core.refusal import Refusal
@@ -308,7 +311,7 @@ def test_its_file_and_pictures(tmp_path):
     from scipy.io import netcdf_file
 
     from geomech import plots
-    from geomech.studies import fields
+    from geomech.studies.maps import fields
 
     scene = scenes.parse(SCENE.format(law="viscous", numbers=LAWS["viscous"]))
     fields.save_connection(tmp_path / "c.nc", SceneTables(scene))

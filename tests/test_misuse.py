@@ -16,15 +16,15 @@ from tabled import of_json, tabled
 import geomech as geomech_package
 from geomech import scenes
 from geomech.core.errors import UnitWarning, VelocityWarning
-from geomech.describe.scene import description
-from geomech.gaits import Circle, Ellipse, Sine
-from geomech.geometry import connection, curvature
-from geomech.geometry.stretch import stretch
+from geomech.mathematics.gaits import Circle, Ellipse, Sine
+from geomech.mathematics.geometry import connection, curvature
+from geomech.mathematics.geometry.stretch import stretch
+from geomech.mathematics.systems import NoSlipSnake, Swimmer
 from geomech.scenes import Numerics, Scene
-from geomech.studies.choose import cheapest_displacements
+from geomech.shell.describe.scene import description
+from geomech.studies.displacement.choose import cheapest_displacements
+from geomech.studies.mechanics.single import diagnosed_velocity as single_of
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.single import diagnosed_velocity as single_of
-from geomech.systems import NoSlipSnake, Swimmer
 from rft import Backbone, Chain, Coulomb, EndCaps, Serpenoid, Viscous
 from rft.core.refusal import Refusal
 

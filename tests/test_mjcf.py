@@ -14,8 +14,8 @@ from tabled import of_json
 import geomech as face
 from geomech import scenes
 from geomech.core.setting import Setting
-from geomech.studies import walking
-from geomech.studies.sweep import sweep
+from geomech.studies.displacement.sweep import sweep
+from geomech.studies.terradynamics import walking
 from rft.core.refusal import Refusal
 from rft.terradynamics.meshes import Spatial
 from rft.terradynamics.meshes.contact import faces

@@ -8,16 +8,17 @@ from tabled import swept_table, tabled, tabled_json
 
 import rft
 from geomech import scenes
-from geomech.gaits import Circle, Fourier, Wave
-from geomech.geometry import connection, curvature
-from geomech.geometry.coordinates import change_velocity
+from geomech.mathematics.gaits import Circle, Fourier, Wave
+from geomech.mathematics.geometry import connection, curvature
+from geomech.mathematics.geometry.coordinates import change_velocity
+from geomech.mathematics.systems import Swimmer, Table
+from geomech.mathematics.systems.base import shape_labels
+from geomech.mathematics.systems.swimmer import is_three_link
 from geomech.scenes import Scene
-from geomech.studies import fields, sweep
 from geomech.studies.available import available_tiers
+from geomech.studies.displacement import sweep
+from geomech.studies.maps import fields
 from geomech.studies.scene_tables import SceneTables, refuse_outside
-from geomech.systems import Swimmer, Table
-from geomech.systems.base import shape_labels
-from geomech.systems.swimmer import is_three_link
 from rft import Chain, EndCaps, Granular, Serpenoid, SkinFriction, Transient, Viscous
 
 pytestmark = pytest.mark.usefixtures("fastest")

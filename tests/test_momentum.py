@@ -6,15 +6,19 @@ import numpy as np
 import pytest
 from registry import SYSTEMS
 
-from geomech.gaits import Circle, Ellipse
-from geomech.geometry import coordinates, metric
+from geomech.mathematics.gaits import Circle, Ellipse
+from geomech.mathematics.geometry import coordinates, metric
+from geomech.mathematics.systems import (
+    DifferentialDrive,
+    FloatingChain,
+    IdealFluidSwimmer,
+)
+from geomech.mathematics.systems.capabilities import OwnMetric, capability
+from geomech.mathematics.systems.framed import in_frame
+from geomech.mathematics.tiers.base import Numerics
 from geomech.scenes import Scene
-from geomech.studies import motion as moving
+from geomech.studies.mechanics import motion as moving
 from geomech.studies.scene_tables import SceneTables
-from geomech.systems import DifferentialDrive, FloatingChain, IdealFluidSwimmer
-from geomech.systems.capabilities import OwnMetric, capability
-from geomech.systems.framed import in_frame
-from geomech.tiers.base import Numerics
 from rft.bodies.base import body_size
 from rft.core.refusal import Refusal
 

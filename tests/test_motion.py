@@ -12,17 +12,18 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from PIL import Image, ImageSequence
 from registry import BODIES, SYSTEMS
 
-from geomech import films, plots, scenes
-from geomech.gaits import Circle, Ellipse, Fourier, Sine
-from geomech.geometry import reconstruct
+from geomech import plots, scenes
 from geomech.io import results as io
+from geomech.mathematics.gaits import Circle, Ellipse, Fourier, Sine
+from geomech.mathematics.geometry import reconstruct
+from geomech.mathematics.systems import NoSlipSnake, Solver, Swimmer
+from geomech.mathematics.systems.capabilities import solver_of
+from geomech.plots import films
 from geomech.plots.style import STYLE
 from geomech.questions.trajectory import Trajectory
 from geomech.scenes import Numerics, Scene
-from geomech.studies import motion as moving
+from geomech.studies.mechanics import motion as moving
 from geomech.studies.scene_tables import SceneTables
-from geomech.systems import NoSlipSnake, Solver, Swimmer
-from geomech.systems.capabilities import solver_of
 from rft import (
     Backbone,
     BodyInertia,

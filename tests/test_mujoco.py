@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from geomech import scenes
 from geomech.scenes import WalkerScene
-from geomech.studies.walking import walked
+from geomech.studies.terradynamics.walking import walked
 from rft.balance import backend
 from rft.core.metres import GRAVITY
 from rft.terradynamics.ground import Aeration, GrainInertia

@@ -11,32 +11,33 @@ import pytest
 
 import geomech
 from geomech.core.variables import Result
-from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Sine
-from geomech.geometry.field import Field
-from geomech.geometry.reconstruct import displacement, slopes, turning
-from geomech.geometry.traits import Traits
-from geomech.optimisation import build_request, optimise, variables
-from geomech.optimisation import loops as series
-from geomech.optimisation.ascent import _Ascent, _shortest
-from geomech.optimisation.constraints import Constraints
-from geomech.optimisation.cycles import CycleValues, Phases, Runs, cycle_values
-from geomech.optimisation.evaluate import evaluate_gait
-from geomech.optimisation.gain import Gained
-from geomech.optimisation.limiting import limiting
-from geomech.optimisation.loops import Loops
-from geomech.optimisation.objectives import Objective
-from geomech.optimisation.optimum import Optimum
-from geomech.optimisation.problem import Enough, Problem
-from geomech.optimisation.search import _Search
-from geomech.optimisation.stroke import Stroke
-from geomech.optimisation.undulations import Undulations
+from geomech.mathematics.gaits import Butterfly, Circle, Ellipse, Fourier, Sine
+from geomech.mathematics.geometry.reconstruct import displacement, slopes, turning
+from geomech.mathematics.geometry.representations.field import Field
+from geomech.mathematics.geometry.traits import Traits
+from geomech.mathematics.systems import Swimmer, Table
+from geomech.mathematics.systems.capabilities import OwnMetric, capability
+from geomech.mathematics.tiers.base import Numerics
 from geomech.questions.optimize import Optimize
 from geomech.scenes import Scene, parse
-from geomech.studies import estimate, fields
+from geomech.studies.estimates import estimate
+from geomech.studies.maps import fields
+from geomech.studies.optimisation import build_request, optimise, variables
+from geomech.studies.optimisation import loops as series
+from geomech.studies.optimisation.cycles import CycleValues, Phases, Runs, cycle_values
+from geomech.studies.optimisation.evaluate import evaluate_gait
+from geomech.studies.optimisation.gain import Gained
+from geomech.studies.optimisation.limiting import limiting
+from geomech.studies.optimisation.local.ascent import _Ascent, _shortest
+from geomech.studies.optimisation.local.constraints import Constraints
+from geomech.studies.optimisation.local.objectives import Objective
+from geomech.studies.optimisation.local.problem import Enough, Problem
+from geomech.studies.optimisation.local.stroke import Stroke
+from geomech.studies.optimisation.loops import Loops
+from geomech.studies.optimisation.optimum import Optimum
+from geomech.studies.optimisation.search import _Search
+from geomech.studies.optimisation.undulations import Undulations
 from geomech.studies.scene_tables import SceneTables
-from geomech.systems import Swimmer, Table
-from geomech.systems.capabilities import OwnMetric, capability
-from geomech.tiers.base import Numerics
 from rft import Chain, Granular, Viscous
 from rft.bodies import ConstantCurvature, Serpenoid
 from rft.bodies.base import body_size
@@ -917,7 +918,7 @@ def test_chains_without_drag_cost_what_their_metric_says():
 
 @pytest.mark.parametrize("name", ["three-link-viscous", "three-link-ideal-fluid"])
 def test_a_table_is_searched_like_its_scene(name, tmp_path):
-    from geomech.studies.fields import save_connection
+    from geomech.studies.maps.fields import save_connection
 
     scene = geomech.load(name).with_numerics(grid=21)
     save_connection(tmp_path / "field.nc", SceneTables(scene))
@@ -982,7 +983,7 @@ def test_all_starts_keep_off_singular_shapes():
 
 def test_a_loop_that_cannot_be_run_ends_no_search():
     """A velocity that fails beyond 1.1 rad: the best is at its edge."""
-    from geomech.optimisation.ascent import ascend
+    from geomech.studies.optimisation.local.ascent import ascend
 
     system = Swimmer(FLUID, Chain())
 

@@ -11,9 +11,9 @@ import pytest
 from commands import geomech
 from frozen import read_commands
 
-from geomech import cli
 from geomech.questions import names
-from geomech.scenes import drag
+from geomech.scenes.data import drag
+from geomech.shell import cli
 from rft.balance import backend
 from rft.laws import CATALOGUE
 from rft.terradynamics.plates import VERTICAL

@@ -14,15 +14,15 @@ from tabled import tabled, tabled_json
 import geomech as library
 from geomech import plots
 from geomech.core.errors import VelocityWarning
-from geomech.describe.scene import description
-from geomech.gaits import Circle, Ellipse
-from geomech.geometry.traits import Traits
 from geomech.io import tables
-from geomech.optimisation import optimise
+from geomech.mathematics.gaits import Circle, Ellipse
+from geomech.mathematics.geometry.traits import Traits
+from geomech.mathematics.systems.base import Cycle, integrated
 from geomech.scenes import Numerics, Scene, kinds, parse
+from geomech.shell.describe.scene import description
+from geomech.studies.mechanics.single import diagnosed_velocity
+from geomech.studies.optimisation import optimise
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.single import diagnosed_velocity
-from geomech.systems.base import Cycle, integrated
 from rft.core.refusal import Refusal
 from rft.core.registry import REGISTRIES
 
@@ -63,7 +63,7 @@ class Waxed(Effect):
         return problem._replace(sides=problem.sides.with_factors(self.by, self.by, 1.0))
 """,
     "gait": """
-from geomech.gaits import Gait
+from geomech.mathematics.gaits import Gait
 
 @geomech.register
 @dataclass(frozen=True, kw_only=True)
@@ -80,7 +80,7 @@ class Egg(Gait):
         return np.stack([-np.sin(t), np.cos(t) + 2 * self.waist * np.cos(2 * t)], -1)
 """,
     "system": """
-from geomech.systems import Traits, integrated
+from geomech.mathematics.systems import Traits, integrated
 
 @geomech.register
 @dataclass(frozen=True)
@@ -103,8 +103,8 @@ def skate(alpha, alphadot, grip=0.5):
     return np.stack([v, grip * alpha[..., 1] * alphadot[..., 0], alphadot[..., 0] - v], -1)
 """,
     "tier": """
-from geomech.geometry.curvature import ccf
-from geomech.tiers import Plan, Tier, fitted
+from geomech.mathematics.geometry.curvature import ccf
+from geomech.mathematics.tiers import Plan, Tier, fitted
 from rft.formulas import se2
 
 def plan(system, numerics, gait, amplitudes):
@@ -123,7 +123,7 @@ def dots(field, component=0, gaits=(), *, ax=None, error=None, labels=(), clim=N
 """,
     "format": """
 import json
-from geomech.geometry.connection import Connection
+from geomech.mathematics.geometry.connection import Connection
 from geomech.io.tables import FORMATS, Stored
 
 def write(path, result, sign="+"):

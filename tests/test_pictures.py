@@ -15,20 +15,25 @@ from tabled import of_swept, of_table
 from geomech import plots, scenes
 from geomech.core.setting import Setting
 from geomech.core.variables import Result, Variable
-from geomech.gaits import Ellipse
-from geomech.geometry.connection import Connection
-from geomech.geometry.field import Field
-from geomech.plots.displacements import ERROR, MEASURED, MEDIUM, TO_ROUNDING
-from geomech.plots.precision import PANELS
-from geomech.plots.precision import SETTINGS as PRECISION
+from geomech.mathematics.gaits import Ellipse
+from geomech.mathematics.geometry.connection import Connection
+from geomech.mathematics.geometry.representations.field import Field
+from geomech.mathematics.systems.base import shape_labels
+from geomech.mathematics.tiers import TIERS
+from geomech.plots.displacement.displacements import (
+    ERROR,
+    MEASURED,
+    MEDIUM,
+    TO_ROUNDING,
+)
+from geomech.plots.displacement.precision import PANELS
+from geomech.plots.displacement.precision import SETTINGS as PRECISION
 from geomech.questions.texts import colour_limit
-from geomech.scenes.measurements import read
+from geomech.scenes.data.measurements import read
+from geomech.studies.displacement.tiered import SETTINGS
 from geomech.studies.scene_tables import SceneTables
 from geomech.studies.settings import Measurements, padded_array
 from geomech.studies.settings import measurement_variables as of_measured
-from geomech.studies.tiered import SETTINGS
-from geomech.systems.base import shape_labels
-from geomech.tiers import TIERS
 from rft.core.refusal import Refusal
 
 AXES = np.linspace(-1.0, 1.5, 11), np.linspace(-0.5, 2.0, 9)

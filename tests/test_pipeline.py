@@ -6,12 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geomech import pipeline, scenes
+from geomech import scenes
 from geomech.core.variables import Result, Variable
 from geomech.io.results import write_csv
 from geomech.questions.base import Question
 from geomech.run.cost import Cost
 from geomech.run.runner import runner
+from geomech.shell import pipeline
 from geomech.studies.settings import measured_order
 from rft.core.refusal import Refusal
 

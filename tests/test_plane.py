@@ -8,18 +8,23 @@ from commands import geomech
 from tabled import of_json, tabled, tabled_json
 
 from geomech import Numerics, Scene, plots
-from geomech.gaits import Circle, Fourier, Wave
-from geomech.geometry import connection
-from geomech.geometry.plane import Plane, ProjectedGait, interpolated_plane, plane
-from geomech.geometry.traits import Traits
-from geomech.geometry.two_form import spanned, spanned_by, two_form
+from geomech.mathematics.gaits import Circle, Fourier, Wave
+from geomech.mathematics.geometry import connection
+from geomech.mathematics.geometry.representations.plane import (
+    Plane,
+    ProjectedGait,
+    interpolated_plane,
+    plane,
+)
+from geomech.mathematics.geometry.traits import Traits
+from geomech.mathematics.geometry.two_form import spanned, spanned_by, two_form
+from geomech.mathematics.systems import Swimmer
+from geomech.mathematics.tiers import TIERS
+from geomech.mathematics.tiers.fitted import finest_grid, is_too_large
 from geomech.scenes.frames import framed
-from geomech.studies.choose import cheapest_displacements
+from geomech.studies.displacement.choose import cheapest_displacements
+from geomech.studies.maps.shape_space import plane_origin as _held
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.shape_space import plane_origin as _held
-from geomech.systems import Swimmer
-from geomech.tiers import TIERS
-from geomech.tiers.fitted import finest_grid, is_too_large
 from rft import CATALOGUE, Chain, Viscous
 from rft.formulas import se2
 
@@ -341,7 +346,7 @@ def test_beyond_the_field_tiers_solve_around_the_gait(monkeypatch):
     tabulated, asked = SceneTables(scene), ([0.5, 0.9], ["area", "path", "direct"])
     found = tabled(tabulated.displacements(*asked))
     assert "field" in found["seconds"]
-    monkeypatch.setattr("geomech.tiers.fitted.LARGEST_FIELD", 9_999)
+    monkeypatch.setattr("geomech.mathematics.tiers.fitted.LARGEST_FIELD", 9_999)
     study = SceneTables(scene)
     around = tabled(study.displacements(*asked))
     assert "field" not in around["seconds"] and not any(
@@ -430,7 +435,9 @@ def test_what_hangs_on_the_surface_is_part_of_every_estimate(monkeypatch):
         "adapted",
         planned(TIERS["adapted"], balances=lambda *asked: 10**8),
     )
-    monkeypatch.setattr("geomech.studies.choose.solved_phases", lambda *asked: 10**9)
+    monkeypatch.setattr(
+        "geomech.studies.displacement.choose.solved_phases", lambda *asked: 10**9
+    )
     assert tabled(cheapest_displacements(scene, [0.4, 0.5], 0.02))["tier"] != "area"
     monkeypatch.setitem(
         TIERS._parts,

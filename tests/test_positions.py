@@ -8,10 +8,10 @@ from commands import geomech as run
 from tabled import tabled, tabled_json
 
 import geomech
-from geomech.gaits import Circle
+from geomech.mathematics.gaits import Circle
+from geomech.mathematics.tiers.fitted import directions
 from geomech.scenes import load, toml
 from geomech.scenes.kinds import load_file
-from geomech.tiers.fitted import directions
 from rft import Backbone, Chain, Coulomb, Granular, Serpenoid, Viscous
 from rft.bodies import BODIES, Positions
 from rft.core.refusal import Refusal

@@ -7,11 +7,12 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
-from geomech import scenes, terminal
+from geomech import scenes
+from geomech.mathematics.systems import Swimmer
 from geomech.run import progress
 from geomech.run.progress import PRINT_INTERVAL, Computation
+from geomech.shell import terminal
 from geomech.studies.scene_tables import SceneTables
-from geomech.systems import Swimmer
 
 VISCOUS = scenes.load("three-link-viscous").with_numerics(grid=5)
 

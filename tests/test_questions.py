@@ -20,14 +20,15 @@ import xarray
 from commands import geomech as run_geomech
 
 import geomech
-from geomech import Refusal, cli, questions
-from geomech.command import command, declaration, parameters
+from geomech import Refusal, questions
 from geomech.core.summary import wrapped
 from geomech.core.variables import Result, Variable
 from geomech.io import results as io
 from geomech.questions import base
 from geomech.results import files, show
 from geomech.run.digest import digest
+from geomech.shell import cli
+from geomech.shell.command import command, declaration, parameters
 
 FIELD = {"grid": 9, "phases": 32}
 FROZEN = frozen.FOLDER
@@ -286,7 +287,7 @@ def test_a_misspelt_keyword_is_told_the_nearest():
 
 def test_help_loads_nothing_that_computes_or_draws():
     """Of any command; the list of all commands loads no NumPy either."""
-    heavy = {"scipy", "matplotlib", "geomech.scenes", "geomech.systems"}
+    heavy = {"scipy", "matplotlib", "geomech.scenes", "geomech.mathematics.systems"}
     code = (
         "import sys\nfrom geomech import cli\n"
         "listed = 'numpy' in sys.modules\n"

@@ -5,7 +5,7 @@ import re
 import pytest
 from commands import geomech
 
-from geomech import cli, renamed
+from geomech.shell import cli, renamed
 
 SUMMARIES = re.compile(r"^  ([a-z][a-z-]*)  +(\S.*)$", re.M)
 

@@ -12,11 +12,12 @@ import pytest
 
 from geomech import scenes
 from geomech.core.errors import Note
-from geomech.gaits import Shchf
 from geomech.io import rows, tables
-from geomech.measured import log as logs
-from geomech.measured.midlines import reader
-from geomech.scenes import drag, penetration
+from geomech.mathematics.gaits import Shchf
+from geomech.scenes.data import drag
+from geomech.scenes.terradynamics import penetration
+from geomech.studies.measured import log as logs
+from geomech.studies.measured.midlines import reader
 from rft.core.refusal import Refusal
 from tests.commands import geomech
 
@@ -169,9 +170,9 @@ def test_every_reader_takes_units_behind_names(tmp_path):
     np.testing.assert_allclose(
         found.rows[:3].T, [[0, 0.47, 0.03], [np.degrees(1.5), 0.009, 1.408]]
     )
-    from geomech.gaits import frames
-    from geomech.scenes import measurements
-    from geomech.scenes.columns import columns
+    from geomech.mathematics.gaits import frames
+    from geomech.scenes.data import measurements
+    from geomech.scenes.format.columns import columns
 
     path = "time (ms)\tx (mm)\tz [cm]\tangle_deg\n0\t0\t0\t90\n500\t1,5\t2,5\t180\n"
     values = columns(

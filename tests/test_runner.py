@@ -14,11 +14,9 @@ from commands import geomech
 from tasks import doubled, who
 from test_store import HARD, same
 
-from geomech import api, cli, load_result, plots, scenes, terminal
-from geomech.geometry import connection
-from geomech.optimisation import build_request, search
-from geomech.optimisation.variables import displacement, values
-from geomech.pipeline import allow, storing
+from geomech import api, load_result, plots, scenes
+from geomech.mathematics.geometry import connection
+from geomech.mathematics.systems.capabilities import with_solver
 from geomech.questions.trajectory import Trajectory
 from geomech.run import pending, store
 from geomech.run import runner as runners
@@ -27,9 +25,14 @@ from geomech.run.runner import Runner, digest_context, runner
 from geomech.run.store import Store
 from geomech.run.workers import using
 from geomech.scenes import inputs, kinds
-from geomech.studies import cost, estimate, tiered, walking
+from geomech.shell import cli, terminal
+from geomech.shell.pipeline import allow, storing
+from geomech.studies.displacement import tiered
+from geomech.studies.estimates import cost, estimate
+from geomech.studies.optimisation import build_request, search
+from geomech.studies.optimisation.variables import displacement, values
 from geomech.studies.scene_tables import SceneTables
-from geomech.systems.capabilities import with_solver
+from geomech.studies.terradynamics import walking
 from rft import Backbone, DisturbedGround, Granular, Transient
 from rft import BodyInertia as Heavy
 from rft.balance import backend

@@ -10,9 +10,9 @@ from tabled import tabled
 
 import rft
 from geomech import scenes
+from geomech.mathematics.systems.base import as_system, length_unit
 from geomech.studies.available import default_tiers
 from geomech.studies.scene_tables import SceneTables
-from geomech.systems.base import as_system, length_unit
 from rft import Chain, Granular, Viscous
 from rft.core.refusal import Refusal
 

@@ -10,11 +10,11 @@ from structs import cell, save
 
 import rft
 from geomech import scenes
-from geomech.gaits import Butterfly, Circle, Shchf
 from geomech.io import shchf
+from geomech.mathematics.gaits import Butterfly, Circle, Shchf
+from geomech.mathematics.systems import Swimmer
 from geomech.scenes import Scene
 from geomech.studies.scene_tables import SceneTables
-from geomech.systems import Swimmer
 from rft.core.refusal import Refusal
 
 T = np.linspace(0, 2 * np.pi, 201)

@@ -14,12 +14,12 @@ import xarray
 import geomech
 import rft
 from geomech import plots
-from geomech.gaits import Circle, Ellipse
-from geomech.geometry import connection, curvature
+from geomech.mathematics.gaits import Circle, Ellipse
+from geomech.mathematics.geometry import connection, curvature
+from geomech.mathematics.systems import NoSlipSnake, Swimmer
 from geomech.scenes import Numerics, Scene, load
-from geomech.studies import fields
+from geomech.studies.maps import fields
 from geomech.studies.scene_tables import SceneTables
-from geomech.systems import NoSlipSnake, Swimmer
 from rft.laws import CATALOGUE
 
 pytestmark = pytest.mark.usefixtures("fastest")
@@ -140,7 +140,7 @@ def test_reprs_are_short_and_say_shapes_ranges_and_units(study, table, swept):
 
 
 def rft_wave():
-    from geomech.gaits import Fourier
+    from geomech.mathematics.gaits import Fourier
 
     return Fourier(cos=((0.2,), (0.1,), (0.0,)), sin=((0.0,), (0.3,), (0.4,)))
 
@@ -164,7 +164,7 @@ def test_notebooks_get_tables_and_pictures(study, table):
     assert float(cells[7]) == 0.5
     x = table["x"].values[1, 0]
     assert float(cells[8]) == pytest.approx(x, rel=1e-3, abs=1e-9)
-    from geomech import notebook
+    from geomech.shell import notebook
 
     fresh = SceneTables(study.scene)
     assert pictures(notebook.study(fresh)) == []

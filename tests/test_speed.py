@@ -12,12 +12,14 @@ from registry import GAITS
 from tabled import swept_table, tabled
 
 from geomech import scenes
-from geomech.gaits import Circle
 from geomech.io.results import from_dict
-from geomech.studies import report, sweep, undulation
-from geomech.studies.choose import cheapest_displacements
+from geomech.mathematics.gaits import Circle
+from geomech.mathematics.systems import Swimmer
+from geomech.studies import report
+from geomech.studies.displacement import sweep
+from geomech.studies.displacement.choose import cheapest_displacements
+from geomech.studies.mechanics import undulation
 from geomech.studies.scene_tables import SceneTables
-from geomech.systems import Swimmer
 from rft import BodyInertia, GrainInertia
 from rft.core.refusal import Refusal
 

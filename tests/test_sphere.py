@@ -5,14 +5,15 @@ import pytest
 from commands import geomech
 from tabled import tabled, tabled_json
 
-from geomech.gaits import Fourier
-from geomech.geometry import connection, harmonics
-from geomech.geometry.traits import Traits
+from geomech.mathematics.gaits import Fourier
+from geomech.mathematics.geometry import connection
+from geomech.mathematics.geometry.representations import harmonics
+from geomech.mathematics.geometry.traits import Traits
+from geomech.mathematics.systems import Swimmer
+from geomech.mathematics.tiers import harmonic
 from geomech.scenes import Numerics, Scene
 from geomech.studies.available import default_tiers
 from geomech.studies.scene_tables import SceneTables
-from geomech.systems import Swimmer
-from geomech.tiers import harmonic
 from rft import CATALOGUE, Chain
 
 pytestmark = pytest.mark.usefixtures("fastest")

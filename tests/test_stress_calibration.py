@@ -10,8 +10,8 @@ from tabled import of_json
 
 from geomech import scenes as scene
 from geomech.io import rows
-from geomech.scenes import penetration
-from geomech.studies import calibration, stress_calibration
+from geomech.scenes.terradynamics import penetration
+from geomech.studies.terradynamics import calibration, stress_calibration
 from rft.fits import plates as calibrate
 from rft.fits.plates import (
     COEFFICIENTS,
@@ -449,7 +449,7 @@ def test_numbers_are_those_of_the_fit(tmp_path):
 
 
 def test_drags_are_drawn_where_the_same_plate_moves_ahead():
-    from geomech.plots.terradynamics import mirrored_ahead
+    from geomech.plots.terradynamics.intruders import mirrored_ahead
 
     beta, gamma = np.random.default_rng(8).uniform(-360, 360, (2, 400))
     b, g, side = mirrored_ahead(beta, gamma)

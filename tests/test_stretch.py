@@ -5,10 +5,14 @@ import pytest
 from matplotlib.axes import Axes
 
 from geomech import plots
-from geomech.gaits import Circle
-from geomech.geometry import connection, curvature, metric
-from geomech.geometry.field import Field
-from geomech.geometry.stretch import _inverted_fraction, _linear_map, stretch
+from geomech.mathematics.gaits import Circle
+from geomech.mathematics.geometry import connection, curvature, metric
+from geomech.mathematics.geometry.representations.field import Field
+from geomech.mathematics.geometry.stretch import (
+    _inverted_fraction,
+    _linear_map,
+    stretch,
+)
 
 
 def constant(M, points=9, extent=1.5):

@@ -10,7 +10,7 @@ import tomllib
 import mutants
 import pytest
 
-from geomech import describe
+from geomech.shell import describe
 
 ROOT = pathlib.Path(__file__).parents[1]
 # Beside the systems: commands list the named media and ask a stress map, an intruder scene has a law, a body and effects but no
@@ -156,7 +156,7 @@ def test_modules_import_from_their_own_layer_or_a_lower_one(imported):
         if name.count(".") == 1 and FILES[name].name == "__init__.py"
     }
     assert {name for name in folders if layer(name) == len(LAYERS) - 1} == {
-        "geomech.describe",
+        "geomech.shell.describe",
         "figures.campaigns",
     }
 
@@ -204,7 +204,7 @@ def test_mutants_are_programs_that_differ():
 
 
 def test_a_command_that_describes_is_the_function_of_its_file():
-    files = {p.stem for p in (ROOT / "geomech" / "describe").glob("*.py")}
+    files = {p.stem for p in (ROOT / "geomech" / "shell" / "describe").glob("*.py")}
     shared = {"__init__", "builtin", "grains", "scene", "system"}
     assert files == {*describe.SUMMARIES, *shared}
 
@@ -224,7 +224,7 @@ SPEAK_OF_OPTIONS = (
 
 
 def test_what_python_reaches_names_arguments_and_no_options():
-    """A refusal marks an argument, which a command spells as its option (`geomech.terminal`)."""
+    """A refusal marks an argument, which a command spells as its option (`geomech.shell.terminal`)."""
     texts = []
     for path in sorted(p for x in ("rft", "geomech") for p in (ROOT / x).rglob("*.py")):
         if (

@@ -7,7 +7,9 @@ from commands import geomech
 from tabled import swept_table
 
 from geomech import scenes
-from geomech.studies import cycles, estimate, grid, sweep
+from geomech.studies import grid
+from geomech.studies.displacement import cycles, sweep
+from geomech.studies.estimates import estimate
 from geomech.studies.scene_tables import SceneTables
 from rft import CATALOGUE, Granular
 from rft.core.refusal import Refusal

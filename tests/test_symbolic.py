@@ -6,20 +6,21 @@ import sympy as sp
 from commands import geomech
 from registry import SYSTEMS
 
-from geomech import scenes, symbolic
-from geomech.gaits import Circle
-from geomech.scenes import Scene
-from geomech.studies.scene_tables import SceneTables
-from geomech.symbolic import connections
-from geomech.systems import (
+from geomech import scenes
+from geomech.mathematics import symbolic
+from geomech.mathematics.gaits import Circle
+from geomech.mathematics.symbolic import connections
+from geomech.mathematics.systems import (
     DifferentialDrive,
     FloatingChain,
     IdealFluidSwimmer,
     NoSlipSnake,
     Swimmer,
 )
-from geomech.systems.framed import formula
-from geomech.tiers.base import Numerics
+from geomech.mathematics.systems.framed import formula
+from geomech.mathematics.tiers.base import Numerics
+from geomech.scenes import Scene
+from geomech.studies.scene_tables import SceneTables
 from rft import Backbone, Chain, Coulomb, SkinFriction, Viscous
 from rft.formulas import se2
 

@@ -7,8 +7,8 @@ import pytest
 from registry import GAITS, SYSTEMS
 from tabled import tabled
 
-from geomech.gaits import Butterfly, Circle, Fourier, Wave
-from geomech.geometry.symmetry import (
+from geomech.mathematics.gaits import Butterfly, Circle, Fourier, Wave
+from geomech.mathematics.geometry.symmetry import (
     ALWAYS,
     BACKWARDS,
     MIRRORED,
@@ -16,7 +16,7 @@ from geomech.geometry.symmetry import (
     RETRACED,
     zero_components,
 )
-from geomech.geometry.traits import Traits
+from geomech.mathematics.geometry.traits import Traits
 from geomech.scenes.model import Scene
 from geomech.studies.scene_tables import SceneTables
 from rft.bodies.base import body_size

@@ -6,27 +6,27 @@ from scipy.io import loadmat
 from structs import cell, computed, save, struct
 
 import rft
-from geomech.describe.system import system_lines
-from geomech.gaits import Circle
-from geomech.geometry import connection
-from geomech.geometry.connection import Connection
-from geomech.geometry.curvature import ccf
-from geomech.geometry.minimum_perturbation import minimum_perturbation
 from geomech.io import tables
 from geomech.io.tables import sysplotter
 from geomech.io.tables.base import Stored
-from geomech.scenes import Scene
-from geomech.studies import fields
-from geomech.studies.scene_tables import SceneTables
-from geomech.systems import (
+from geomech.mathematics.gaits import Circle
+from geomech.mathematics.geometry import connection
+from geomech.mathematics.geometry.connection import Connection
+from geomech.mathematics.geometry.curvature import ccf
+from geomech.mathematics.geometry.minimum_perturbation import minimum_perturbation
+from geomech.mathematics.systems import (
     DifferentialDrive,
     IdealFluidSwimmer,
     NoSlipSnake,
     Swimmer,
     Table,
 )
-from geomech.systems.capabilities import table_error
-from geomech.systems.table import LENGTHS
+from geomech.mathematics.systems.capabilities import table_error
+from geomech.mathematics.systems.table import LENGTHS
+from geomech.scenes import Scene
+from geomech.shell.describe.system import system_lines
+from geomech.studies.maps import fields
+from geomech.studies.scene_tables import SceneTables
 from rft.bodies.base import body_size
 from rft.core.refusal import Refusal
 

@@ -9,23 +9,25 @@ import xarray
 from registry import GAITS, SYSTEMS
 from tabled import tabled
 
-from geomech import scenes, symbolic
-from geomech.describe.scene import description
-from geomech.gaits import Circle, Ellipse
-from geomech.geometry import connection, coordinates
-from geomech.geometry.connection import sign_changes
-from geomech.geometry.traits import Traits
+from geomech import scenes
+from geomech.mathematics import symbolic
+from geomech.mathematics.gaits import Circle, Ellipse
+from geomech.mathematics.geometry import connection, coordinates
+from geomech.mathematics.geometry.connection import sign_changes
+from geomech.mathematics.geometry.traits import Traits
+from geomech.mathematics.systems import KINDS, NoSlipSnake, Swimmer
+from geomech.mathematics.systems.base import WrappedSystem, kind_of, length_unit
+from geomech.mathematics.systems.capabilities import stored_table
+from geomech.mathematics.systems.framed import in_frame
+from geomech.mathematics.systems.swimmer import Solver, is_three_link
+from geomech.mathematics.tiers.direct import direct
 from geomech.scenes import Scene
-from geomech.studies import cost, estimate, fields
+from geomech.shell.describe.scene import description
 from geomech.studies.available import default_tiers
+from geomech.studies.estimates import cost, estimate
+from geomech.studies.maps import fields
+from geomech.studies.mechanics.single import diagnosed_velocity
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.single import diagnosed_velocity
-from geomech.systems import KINDS, NoSlipSnake, Swimmer
-from geomech.systems.base import WrappedSystem, kind_of, length_unit
-from geomech.systems.capabilities import stored_table
-from geomech.systems.framed import in_frame
-from geomech.systems.swimmer import Solver, is_three_link
-from geomech.tiers.direct import direct
 from rft import Backbone, Chain, Coulomb, Serpenoid, Transient
 from rft.core.refusal import Refusal
 from rft.formulas import se2

@@ -11,15 +11,17 @@ from scipy.io import loadmat, savemat
 
 import rft
 from geomech import plots, scenes
-from geomech.describe.system import system_lines
-from geomech.gaits import Circle, Ellipse
-from geomech.geometry import connection, harmonics
-from geomech.geometry.coordinates import change_velocity
 from geomech.io import tables
+from geomech.mathematics.gaits import Circle, Ellipse
+from geomech.mathematics.geometry import connection
+from geomech.mathematics.geometry.coordinates import change_velocity
+from geomech.mathematics.geometry.representations import harmonics
+from geomech.mathematics.systems import Swimmer, Table
 from geomech.scenes import Numerics, Scene
-from geomech.studies import effort, estimate, fields
+from geomech.shell.describe.system import system_lines
+from geomech.studies.estimates import effort, estimate
+from geomech.studies.maps import fields
 from geomech.studies.scene_tables import SceneTables
-from geomech.systems import Swimmer, Table
 from rft.core.refusal import Refusal
 from rft.formulas import se2
 

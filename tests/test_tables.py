@@ -22,23 +22,25 @@ from tabled import of_json, tabled
 
 import rft
 from geomech import api, plots, scenes
-from geomech.describe.scene import description
-from geomech.describe.system import system_lines
-from geomech.gaits import Butterfly, Circle, Ellipse, Fourier
-from geomech.geometry import connection
-from geomech.geometry.connection import Connection
 from geomech.io import tables
 from geomech.io.tables import base, mat, matlab, netcdf
 from geomech.io.tables.base import checked_names
 from geomech.io.tables.mat import ERROR
+from geomech.mathematics.gaits import Butterfly, Circle, Ellipse, Fourier
+from geomech.mathematics.geometry import connection
+from geomech.mathematics.geometry.connection import Connection
+from geomech.mathematics.systems import NoSlipSnake, Swimmer, Table
+from geomech.mathematics.systems.base import length_unit
+from geomech.mathematics.systems.capabilities import stored_table, table_error
+from geomech.mathematics.systems.table import LENGTHS
 from geomech.scenes import Numerics, Scene
-from geomech.studies import choose, estimate, fields, tiered
+from geomech.shell.describe.scene import description
+from geomech.shell.describe.system import system_lines
+from geomech.studies.displacement import choose, tiered
+from geomech.studies.estimates import estimate
+from geomech.studies.maps import fields
+from geomech.studies.mechanics.single import diagnosed_velocity
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.single import diagnosed_velocity
-from geomech.systems import NoSlipSnake, Swimmer, Table
-from geomech.systems.base import length_unit
-from geomech.systems.capabilities import stored_table, table_error
-from geomech.systems.table import LENGTHS
 from rft.bodies.base import body_size
 from rft.core.refusal import Refusal
 from rft.laws import CATALOGUE

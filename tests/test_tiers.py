@@ -9,16 +9,17 @@ from registry import GAITS, MEDIA
 from tabled import tabled
 
 from geomech import plots, scenes
-from geomech.gaits import Butterfly, Circle, Fourier, Wave
-from geomech.geometry import connection, family, harmonics
+from geomech.mathematics.gaits import Butterfly, Circle, Fourier, Wave
+from geomech.mathematics.geometry import connection, family
+from geomech.mathematics.geometry.representations import harmonics
+from geomech.mathematics.systems import Swimmer
+from geomech.mathematics.tiers import TIERS, Plan, Tier, fitted
+from geomech.mathematics.tiers.direct import direct
 from geomech.scenes import Numerics, Scene
-from geomech.studies import estimate
 from geomech.studies.available import default_tiers
-from geomech.studies.choose import cheapest_displacements
+from geomech.studies.displacement.choose import cheapest_displacements
+from geomech.studies.estimates import estimate
 from geomech.studies.scene_tables import SceneTables
-from geomech.systems import Swimmer
-from geomech.tiers import TIERS, Plan, Tier, fitted
-from geomech.tiers.direct import direct
 from rft import BodyInertia, Chain, Granular, Viscous
 from rft.balance.listening import listening
 from rft.bodies.base import body_size
@@ -494,7 +495,8 @@ def test_a_table_pays_for_many_amplitudes_and_not_for_few():
 )
 def test_the_position_decides_and_not_the_heading(error, tier, monkeypatch):
     monkeypatch.setattr(
-        "geomech.studies.choose.against_direct", lambda *_: np.tile(error, (400, 1))
+        "geomech.studies.displacement.choose.against_direct",
+        lambda *_: np.tile(error, (400, 1)),
     )
     assert (
         tabled(cheapest_displacements(GLASS, np.linspace(0.3, 2.0, 400), 2e-3))["tier"]
@@ -575,7 +577,7 @@ def test_the_map_of_a_family_gives_each_shape_its_own_value():
 
 def test_every_amplitude_must_meet_the_tolerance(monkeypatch):
     """The refinement goes on to the largest number of phases that is allowed, for the worst of the amplitudes."""
-    monkeypatch.setattr("geomech.studies.choose.MAX_PHASES", 128)
+    monkeypatch.setattr("geomech.studies.displacement.choose.MAX_PHASES", 128)
     with pytest.raises(
         Refusal, match="no tier gets to 1e-09 body lengths .* with 128 phases"
     ):

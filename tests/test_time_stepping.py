@@ -7,14 +7,16 @@ from scipy.integrate import solve_ivp
 from tabled import tabled
 
 from geomech import scenes
-from geomech.gaits import Butterfly, Circle, Ellipse, Sine
-from geomech.geometry.reconstruct import displacement
+from geomech.mathematics.gaits import Butterfly, Circle, Ellipse, Sine
+from geomech.mathematics.geometry.reconstruct import displacement
+from geomech.mathematics.systems import Swimmer
 from geomech.scenes import Scene
-from geomech.studies import estimate, tiered, undulation
-from geomech.studies.batch import joined_scene
-from geomech.studies.choose import cheapest_displacements
+from geomech.studies.displacement import tiered
+from geomech.studies.displacement.batch import joined_scene
+from geomech.studies.displacement.choose import cheapest_displacements
+from geomech.studies.estimates import estimate
+from geomech.studies.mechanics import undulation
 from geomech.studies.scene_tables import SceneTables
-from geomech.systems import Swimmer
 from rft import (
     CATALOGUE,
     Backbone,
@@ -563,7 +565,7 @@ def test_a_tolerance_refines_pieces_or_is_refused(monkeypatch):
     off = estimate.distance(np.array(found[found["tier"]]), truth)
     assert (off <= found["estimate"][found["tier"]]).all()
     assert max(found["estimate"][found["tier"]]) <= 1e-5
-    monkeypatch.setattr("geomech.studies.choose.MAX_PIECES", 40)
+    monkeypatch.setattr("geomech.studies.displacement.choose.MAX_PIECES", 40)
     with pytest.raises(
         Refusal,
         match="no tier gets to 1e-08 body lengths .* with .* phases and 40 pieces",

@@ -18,7 +18,7 @@ from commands import geomech as run
 import geomech
 import rft
 from geomech.questions import names
-from geomech.scenes.keys import sections
+from geomech.scenes.format.keys import sections
 
 ROOT = pathlib.Path(__file__).parents[1]
 
@@ -45,9 +45,15 @@ def test_parts_are_reached_from_the_top():
         Scene,
         Numerics,
     )
-    assert geomech.gaits.Circle in geomech.gaits.KINDS.values()
+    assert geomech.mathematics.gaits.Circle in geomech.mathematics.gaits.KINDS.values()
     assert geomech.media is rft.laws
-    assert set(geomech.tiers.TIERS) == {"area", "adapted", "path", "harmonic", "direct"}
+    assert set(geomech.mathematics.tiers.TIERS) == {
+        "area",
+        "adapted",
+        "path",
+        "harmonic",
+        "direct",
+    }
     study = geomech.Study(geomech.load("three-link-viscous").with_numerics(grid=7))
     assert study.tables.poses("path").shape == (3,)
     axes = geomech.plots.figure(3, 3)[1]
@@ -163,7 +169,7 @@ def test_what_is_completed_can_be_given():
 
 def test_completion_can_be_shown(monkeypatch, capfd):
     monkeypatch.setattr(sys, "stdin", io.StringIO())
-    code = "import sys; sys.argv[0] = 'geomech'; from geomech.cli import main; main(['--show-completion', 'bash'])"
+    code = "import sys; sys.argv[0] = 'geomech'; from geomech.shell.cli import main; main(['--show-completion', 'bash'])"
     assert "_GEOMECH_COMPLETE=complete_bash" in python(
         code, _TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION="1"
     )
@@ -187,7 +193,7 @@ def test_what_checkers_and_people_look_for_beside_the_code_is_there():
 def test_the_program_that_checkers_look_at_runs():
     import typed
 
-    from geomech.systems import KINDS
+    from geomech.mathematics.systems import KINDS
 
     try:
         assert all(

@@ -25,10 +25,11 @@ pytestmark = pytest.mark.skipif(
 )
 COMMAND = """
 import sys
-from geomech import cli, connection
+from geomech import connection
+from geomech.shell import cli
 from geomech.run import pending, store
 from geomech.run import runner as runners
-from geomech.studies import cycles
+from geomech.studies.displacement import cycles
 store.CHECKPOINT = runners.CHECKPOINT = 0.05
 pending.WORTH_PROCESSES = 0.2
 connection.SAMPLES_TOGETHER, cycles.SAMPLES_TOGETHER = 400, 8

@@ -5,16 +5,16 @@ import pytest
 import xarray
 
 import geomech
-from geomech.gaits import Circle, Fourier
-from geomech.geometry import connection, curvature
-from geomech.geometry.connection import Connection
-from geomech.geometry.two_form import spanned, two_form
 from geomech.io.results import to_xarray
-from geomech.studies import fields
+from geomech.mathematics.gaits import Circle, Fourier
+from geomech.mathematics.geometry import connection, curvature
+from geomech.mathematics.geometry.connection import Connection
+from geomech.mathematics.geometry.two_form import spanned, two_form
+from geomech.mathematics.systems import Swimmer, Table
+from geomech.mathematics.tiers.area import area
+from geomech.mathematics.tiers.direct import direct
+from geomech.studies.maps import fields
 from geomech.studies.scene_tables import SceneTables
-from geomech.systems import Swimmer, Table
-from geomech.tiers.area import area
-from geomech.tiers.direct import direct
 from rft import Chain, Viscous
 from rft.core.refusal import Refusal
 

@@ -15,19 +15,21 @@ from tabled import swept_table, tabled
 import geomech
 import rft
 from geomech import scenes
-from geomech.describe.scene import description
-from geomech.gaits import KINDS, Centreline, Circle, Sine
-from geomech.geometry import connection, curvature, family, harmonics, reconstruct
-from geomech.geometry.field import Field
+from geomech.mathematics.gaits import KINDS, Centreline, Circle, Sine
+from geomech.mathematics.geometry import connection, curvature, family, reconstruct
+from geomech.mathematics.geometry.representations import harmonics
+from geomech.mathematics.geometry.representations.field import Field
+from geomech.mathematics.systems import Solver, Swimmer
+from geomech.mathematics.tiers.area import area
+from geomech.mathematics.tiers.direct import direct
+from geomech.mathematics.tiers.path import path
 from geomech.scenes import IntruderScene, MeshScene, Numerics, Scene, WalkerScene, kinds
-from geomech.studies import sweep, undulation
-from geomech.studies.choose import cheapest_displacements
+from geomech.shell.describe.scene import description
+from geomech.studies.displacement import sweep
+from geomech.studies.displacement.choose import cheapest_displacements
+from geomech.studies.mechanics import undulation
+from geomech.studies.mechanics.single import diagnosed_velocity
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.single import diagnosed_velocity
-from geomech.systems import Solver, Swimmer
-from geomech.tiers.area import area
-from geomech.tiers.direct import direct
-from geomech.tiers.path import path
 from rft import Chain, Coulomb, Granular, Viscous, body_velocity
 from rft.core.refusal import Refusal, located
 from rft.formulas import se2
@@ -350,11 +352,24 @@ def test_refusals_carry_facts_and_go_to_other_processes():
 
 
 PUBLIC = [
-    "geomech", "geomech.gaits", "geomech.geometry.connection", "geomech.geometry.curvature",
-    "geomech.geometry.reconstruct", "geomech.measured", "geomech.optimisation", "geomech.plots", "geomech.scenes",
-    "geomech.studies.undulation", "geomech.symbolic", "geomech.systems", "geomech.tiers", "rft", "rft.bodies",
-    "rft.effects", "rft.laws",
-]  # fmt: skip
+    "geomech",
+    "geomech.mathematics.gaits",
+    "geomech.mathematics.geometry.connection",
+    "geomech.mathematics.geometry.curvature",
+    "geomech.mathematics.geometry.reconstruct",
+    "geomech.studies.measured",
+    "geomech.studies.optimisation",
+    "geomech.plots",
+    "geomech.scenes",
+    "geomech.studies.mechanics.undulation",
+    "geomech.mathematics.symbolic",
+    "geomech.mathematics.systems",
+    "geomech.mathematics.tiers",
+    "rft",
+    "rft.bodies",
+    "rft.effects",
+    "rft.laws",
+]
 
 
 def own(part) -> bool:

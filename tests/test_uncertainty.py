@@ -9,15 +9,16 @@ from commands import geomech
 from tabled import swept_table, tabled
 
 from geomech import plots, scenes
-from geomech.gaits import Butterfly, Ellipse
 from geomech.io.results import from_dict
+from geomech.mathematics.gaits import Butterfly, Ellipse
+from geomech.mathematics.systems import Swimmer, capability
+from geomech.mathematics.systems.capabilities import Uncertain
 from geomech.scenes import Scene
-from geomech.studies import sweep, uncertainty
-from geomech.studies.choose import cheapest_displacements
+from geomech.studies.displacement import sweep
+from geomech.studies.displacement.choose import cheapest_displacements
+from geomech.studies.estimates import uncertainty
 from geomech.studies.scene_tables import SceneTables
 from geomech.studies.tables import QUANTITIES, pose_quantities
-from geomech.systems import Swimmer, capability
-from geomech.systems.capabilities import Uncertain
 from rft import Chain, Granular, SkinFriction, Transient, Viscous
 from rft.core.refusal import Refusal
 

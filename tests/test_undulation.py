@@ -11,12 +11,12 @@ from tabled import tabled
 import rft
 from figures import fig09c_efficiency, fig10_neuromechanics
 from geomech import scenes
-from geomech.gaits import Circle, Fourier, Sine, Wave
-from geomech.geometry.reconstruct import displacement
+from geomech.mathematics.gaits import Circle, Fourier, Sine, Wave
+from geomech.mathematics.geometry.reconstruct import displacement
+from geomech.mathematics.systems import Swimmer
 from geomech.scenes import Scene
-from geomech.studies import undulation
+from geomech.studies.mechanics import undulation
 from geomech.studies.scene_tables import SceneTables
-from geomech.systems import Swimmer
 from rft import (
     CATALOGUE,
     Backbone,
@@ -487,7 +487,7 @@ def test_a_sweep_is_one_batch_of_everything():
     """100 elements, 100 phases and many amplitudes go to the solver in one call."""
     calls = []
     counted = lambda a, d: calls.append(a.shape) or SANDFISH.system.velocity(a, d)
-    from geomech.tiers.direct import direct
+    from geomech.mathematics.tiers.direct import direct
 
     direct(counted, SANDFISH.gait, [0.1, 0.2, 0.3], phases=100)
     assert calls == [(3, 100, 99)]

@@ -13,15 +13,16 @@ from scipy.io import netcdf_file
 from tabled import of_json, of_swept
 
 from figures.walking_sensitivity import Sheet
-from geomech import films, plots, scenes
+from geomech import plots, scenes
 from geomech.core.variables import Result
-from geomech.describe.scene import description
 from geomech.io.results import from_dict
-from geomech.plots.walking import walk_stage
+from geomech.plots import films
+from geomech.plots.terradynamics.walking import walk_stage
 from geomech.questions import walk as questions_walk
 from geomech.scenes import WalkerScene
-from geomech.studies import walking
-from geomech.studies.sweep import Plan
+from geomech.shell.describe.scene import description
+from geomech.studies.displacement.sweep import Plan
+from geomech.studies.terradynamics import walking
 from rft.balance.backend import preferring
 from rft.core.metres import GRAVITY
 from rft.core.refusal import Refusal

@@ -29,16 +29,17 @@ from tasks import (
 )
 
 import geomech
-from geomech import scenes, terminal
+from geomech import scenes
 from geomech.core.errors import Note, UnitWarning
-from geomech.geometry import connection, metric
-from geomech.optimisation import build_request, search
-from geomech.optimisation.variables import answers, displacement, values
+from geomech.mathematics.geometry import connection, metric
 from geomech.run import executors, pending
 from geomech.run.runner import Runner, runner, use_runner
 from geomech.run.workers import using
 from geomech.scenes import kinds
-from geomech.studies import cycles, sweep, tiered
+from geomech.shell import terminal
+from geomech.studies.displacement import cycles, sweep, tiered
+from geomech.studies.optimisation import build_request, search
+from geomech.studies.optimisation.variables import answers, displacement, values
 from geomech.studies.scene_tables import SceneTables
 from rft.balance import backend
 from rft.core import threads as threaded
@@ -310,7 +311,7 @@ def test_error_studies_have_the_same_digits_whoever_computes(
 def test_searches_have_the_same_digits_whoever_computes(two, given_away, monkeypatch):
     for names in (
         search.__globals__,
-        vars(sys.modules["geomech.optimisation.request"]),
+        vars(sys.modules["geomech.studies.optimisation.request"]),
     ):
         monkeypatch.setitem(names, "N_PERTURBED", 1)  # perturbation of each size
         monkeypatch.setitem(names, "N_FROM_NARROWER", 1)  # start from narrower limits

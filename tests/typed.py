@@ -9,11 +9,26 @@ from matplotlib.axes import Axes
 
 import geomech
 import rft
-from geomech import connection, curvature, plots, reconstruct, symbolic
+from geomech import connection, curvature, plots, reconstruct
 from geomech.core.variables import Result, Variable
-from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Gait, Points, Sine
-from geomech.geometry import family, harmonics
-from geomech.geometry.traits import Traits
+from geomech.mathematics import symbolic
+from geomech.mathematics.gaits import (
+    Butterfly,
+    Circle,
+    Ellipse,
+    Fourier,
+    Gait,
+    Points,
+    Sine,
+)
+from geomech.mathematics.geometry import family
+from geomech.mathematics.geometry.representations import harmonics
+from geomech.mathematics.geometry.traits import Traits
+from geomech.mathematics.systems import NoSlipSnake, Swimmer
+from geomech.mathematics.systems.base import integrated
+from geomech.mathematics.tiers.area import area
+from geomech.mathematics.tiers.direct import direct
+from geomech.mathematics.tiers.path import path
 from geomech.scenes import (
     Numerics,
     Scene,
@@ -24,15 +39,11 @@ from geomech.scenes import (
     tables,
     toml,
 )
-from geomech.studies import cost, undulation
-from geomech.studies.choose import cheapest_displacements
+from geomech.studies.displacement.choose import cheapest_displacements
+from geomech.studies.displacement.sweep import sweep
+from geomech.studies.estimates import cost
+from geomech.studies.mechanics import undulation
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.sweep import sweep
-from geomech.systems import NoSlipSnake, Swimmer
-from geomech.systems.base import integrated
-from geomech.tiers.area import area
-from geomech.tiers.direct import direct
-from geomech.tiers.path import path
 from rft import Chain, Granular, body_velocity, time_steps, work_done
 
 Array = npt.NDArray[np.float64]
@@ -119,7 +130,7 @@ def scenes() -> list[Any]:
     )
     asked = (
         geomech.fit_log,
-        geomech.measured.Fitted,
+        geomech.studies.measured.Fitted,
         geomech.accuracy,
         cost.total_cost,
         undulation.performance,

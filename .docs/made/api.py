@@ -9,7 +9,7 @@ import io
 import re
 from pathlib import Path
 
-from geomech.scenes.key import first_sentence
+from geomech.scenes.format.key import first_sentence
 from rft.core.checks import number_fields
 
 PACKAGES = {
@@ -17,21 +17,21 @@ PACKAGES = {
         "geomech",
         "geomech.scenes",
         "geomech.studies.scene_tables",
-        "geomech.gaits",
-        "geomech.systems",
-        "geomech.tiers",
-        "geomech.optimisation",
-        "geomech.measured",
-        "geomech.studies.undulation",
+        "geomech.mathematics.gaits",
+        "geomech.mathematics.systems",
+        "geomech.mathematics.tiers",
+        "geomech.studies.optimisation",
+        "geomech.studies.measured",
+        "geomech.studies.mechanics.undulation",
         "geomech.plots",
         "geomech.run.workers",
     ],
     "Geometry of any velocity": [
-        "geomech.geometry.connection",
-        "geomech.geometry.curvature",
-        "geomech.geometry.reconstruct",
-        "geomech.geometry.metric",
-        "geomech.symbolic",
+        "geomech.mathematics.geometry.connection",
+        "geomech.mathematics.geometry.curvature",
+        "geomech.mathematics.geometry.reconstruct",
+        "geomech.mathematics.geometry.metric",
+        "geomech.mathematics.symbolic",
     ],
     "Mechanics of the horizontal plane": [
         "rft",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 
-from geomech import cli
+from geomech.shell import cli
 
 
 def page() -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from geomech.scenes import keys
+from geomech.scenes.format import keys
 
 
 def page() -> str:

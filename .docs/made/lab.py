@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from geomech import lab, load
-from geomech.studies.lab import GALLERY, Lab
+from geomech.studies.maps.lab import GALLERY, Lab
 
 FILE = Path(__file__).parents[1] / "generated" / "extra" / "gait-lab.html"
 

@@ -12,14 +12,14 @@ import sympy as sp
 from scipy.integrate import quad, solve_ivp
 
 import geomech
-from geomech.gaits import Circle
-from geomech.geometry import metric
-from geomech.geometry.curvature import ccf
-from geomech.geometry.minimum_perturbation import minimum_perturbation
-from geomech.studies import undulation
-from geomech.symbolic import velocity, viscous_chain
-from geomech.symbolic.connections import links
-from geomech.tiers.area import area
+from geomech.mathematics.gaits import Circle
+from geomech.mathematics.geometry import metric
+from geomech.mathematics.geometry.curvature import ccf
+from geomech.mathematics.geometry.minimum_perturbation import minimum_perturbation
+from geomech.mathematics.symbolic import velocity, viscous_chain
+from geomech.mathematics.symbolic.connections import links
+from geomech.mathematics.tiers.area import area
+from geomech.studies.mechanics import undulation
 from rft.terradynamics.plates import VERTICAL
 
 

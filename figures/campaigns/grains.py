@@ -30,7 +30,7 @@ import numpy as np
 
 from geomech.io.files import write_text
 from geomech.scenes import load
-from geomech.studies.grain_swim import RAMP, GrainSwim, cycle_poses
+from geomech.studies.grains.swim import RAMP, GrainSwim, cycle_poses
 from rft.grains import Bed, Experiment, Run, Spheres, Stroke, Tow, plate, rod
 from rft.grains.drag import SteadyForce, steady_force
 from rft.grains.reversal import drags

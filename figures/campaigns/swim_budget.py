@@ -37,9 +37,9 @@ import numpy as np
 
 from figures.campaigns.grains import BEDS, FOLDER, SWIMS, swim
 from geomech.io.files import write_text
-from geomech.studies.calibration import rod_fit
-from geomech.studies.grain_swim import FLANK, RAMP, GrainSwim
-from geomech.systems.swimmer import Swimmer
+from geomech.mathematics.systems.swimmer import Swimmer
+from geomech.studies.grains.swim import FLANK, RAMP, GrainSwim
+from geomech.studies.terradynamics.calibration import rod_fit
 from rft.effects import EndCaps
 from rft.fits.rods import Fit
 from rft.grains.drag import END

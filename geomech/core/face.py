@@ -1,7 +1,7 @@
 """Methods of values that need the layers above them: display in notebooks, conversion,
 loading.
 
-Such a method calls the function that `implementation` returns. `geomech.face`, imported
+Such a method calls the function that `implementation` returns. `geomech.shell.face`, imported
 with the package, registers these functions."""
 
 from __future__ import annotations

@@ -21,14 +21,14 @@ from typing import Any
 import numpy as np
 
 from geomech.core.version import VERSION
-from geomech.gaits import KINDS as GAITS
-from geomech.gaits import Gait, Points
-from geomech.geometry.gait import LARGEST
 from geomech.io.files import atomic_file
-from geomech.scenes.key import keys_of
+from geomech.mathematics.gaits import KINDS as GAITS
+from geomech.mathematics.gaits import Gait, Points
+from geomech.mathematics.geometry.gait import LARGEST
+from geomech.mathematics.systems.base import body_size, length_unit, shape_labels
+from geomech.scenes.format.key import keys_of
 from geomech.scenes.write import text_of, without_gait
-from geomech.studies.charts import RESIDUAL_SHARES, Chart, Family, fourier_series
-from geomech.systems.base import body_size, length_unit, shape_labels
+from geomech.studies.maps.charts import RESIDUAL_SHARES, Chart, Family, fourier_series
 from rft.core.refusal import Refusal
 
 FOLDER = Path(__file__).parent

@@ -1,4 +1,4 @@
-// The chart of a scene: what geomech.studies.charts holds, and its three tiers.
+// The chart of a scene: what geomech.studies.maps.charts holds, and its three tiers.
 
 const TIERS = ["harmonic", "path", "area"];
 

@@ -6,7 +6,7 @@ const literal = (x) => (/^-?\d+$/.test(String(x)) ? `${x}.0` : String(x));
 const row = (values) => `[${values.map(literal).join(", ")}]`;
 const rows = (values) => `[${values.map(row).join(", ")}]`;
 
-/** Return kind, and the keys and values that describe the unit curve, as scenes and geomech.gaits name them. */
+/** Return kind, and the keys and values that describe the unit curve, as scenes and geomech.mathematics.gaits name them. */
 function described() {
   if (state.loop === "circle" || state.loop === "butterfly") return [state.loop, {}];
   const loop = loopOf();
@@ -36,7 +36,7 @@ function asPython() {
   const chart = chartOf(), varied = chart.family && state.value !== chart.family.own;
   return [
     "import geomech",
-    `from geomech.gaits import ${name}`,
+    `from geomech.mathematics.gaits import ${name}`,
     varied ? `study = geomech.study("loop.toml")  # the saved scene: ${chart.family.key} = ${state.value}` : `study = geomech.study(${quoted(chart.name)})`,
     ...(state.frame === chart.frame ? [] : [`study = study.in_frame(${quoted(state.frame)})`]),
     `gait = ${name}(${call})`,

@@ -1,4 +1,4 @@
-// Loops in shape space: alpha = centre + amplitude unit(t), as geomech.gaits. A loop is a Fourier series {cos, sin}, two rows
+// Loops in shape space: alpha = centre + amplitude unit(t), as geomech.mathematics.gaits. A loop is a Fourier series {cos, sin}, two rows
 // each, or the periodic cubic spline through {points}.
 
 const TILT = Math.SQRT1_2;

@@ -1,4 +1,4 @@
-// Numbers: splines, Fourier transforms, planar motions. The formulas are those of geomech.geometry; nothing here knows a page.
+// Numbers: splines, Fourier transforms, planar motions. The formulas are those of geomech.mathematics.geometry; nothing here knows a page.
 
 const TAU = 2 * Math.PI;
 
@@ -144,7 +144,7 @@ function inverse(g) {
 
 /**
  * Return the net pose of a cycle of body velocities xi (3 N), and its poses (3 (N + 1)) where `whole` is true: exact for the
- * trigonometric polynomials through the samples, as `geomech.geometry.reconstruct`. N is a power of two.
+ * trigonometric polynomials through the samples, as `geomech.mathematics.geometry.reconstruct`. N is a power of two.
  */
 function reconstruct(xi, whole) {
   const n = xi.length / 3, half = n / 2;

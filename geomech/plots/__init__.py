@@ -6,14 +6,19 @@ shows.
 Nothing here imports pyplot or changes its state.
 """
 
-from geomech.plots.displacements import (
+from geomech.plots.displacement.displacements import (
     PANELS,
     displacement,
     displacement_figure,
     medium_band,
     net,
 )
-from geomech.plots.drag import drag_figure
+from geomech.plots.displacement.precision import (
+    SETTING_MARKER,
+    accuracy_figure,
+    work_precision,
+)
+from geomech.plots.displacement.sweeps import curves, sweep_figure
 from geomech.plots.figures import (
     ccf_figure,
     connection_figure,
@@ -27,7 +32,6 @@ from geomech.plots.forces import (
     stacked_by_phase,
     stacked_by_place,
 )
-from geomech.plots.grains import grains_figure
 from geomech.plots.maps import (
     COMPONENTS,
     FINEST,
@@ -44,12 +48,10 @@ from geomech.plots.maps import (
     unknown,
     vector_field,
 )
-from geomech.plots.measured import measured_figure
-from geomech.plots.midlines import midlines_figure
+from geomech.plots.measured.gaits import measured_figure
+from geomech.plots.measured.midlines import midlines_figure
 from geomech.plots.motion import LINES, filmstrip, stage
 from geomech.plots.optimum import optimum_angles, optimum_figure, optimum_map
-from geomech.plots.plates import penetration_figure, plates_figure
-from geomech.plots.precision import SETTING_MARKER, accuracy_figure, work_precision
 from geomech.plots.stretched import stretched_figure, stretched_map
 from geomech.plots.style import (
     MARKED,
@@ -69,15 +71,17 @@ from geomech.plots.styles import (
     streamlines,
     winding,
 )
-from geomech.plots.sweeps import curves, sweep_figure
-from geomech.plots.terradynamics import (
+from geomech.plots.terradynamics.drag import drag_figure
+from geomech.plots.terradynamics.grains import grains_figure
+from geomech.plots.terradynamics.intruders import (
     draw_stress,
     intrusion_figure,
     square_of_angles,
     stress_figure,
     stress_map,
 )
-from geomech.plots.walking import walk_figure, walk_strip
+from geomech.plots.terradynamics.plates import penetration_figure, plates_figure
+from geomech.plots.terradynamics.walking import walk_figure, walk_strip
 
 __all__ = [
     "CCF_STYLES",

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from geomech.core.errors import choose
-from geomech.gaits import Gait
-from geomech.geometry.connection import Connection
-from geomech.geometry.field import Field
-from geomech.geometry.metric import Finsler, Metric
-from geomech.geometry.plane import Plane, ProjectedGait
-from geomech.geometry.two_form import TwoForm
+from geomech.mathematics.gaits import Gait
+from geomech.mathematics.geometry.connection import Connection
+from geomech.mathematics.geometry.metric import Finsler, Metric
+from geomech.mathematics.geometry.representations.field import Field
+from geomech.mathematics.geometry.representations.plane import Plane, ProjectedGait
+from geomech.mathematics.geometry.two_form import TwoForm
 from geomech.plots.maps import (
     ANGLES,
     PHASES,

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from geomech.core.errors import choose
-from geomech.gaits import Gait
-from geomech.geometry.connection import Connection
-from geomech.geometry.field import Field
-from geomech.geometry.metric import Finsler, Metric
+from geomech.mathematics.gaits import Gait
+from geomech.mathematics.geometry.connection import Connection
+from geomech.mathematics.geometry.metric import Finsler, Metric
+from geomech.mathematics.geometry.representations.field import Field
 from geomech.plots.style import axes_of, figure, quantity, styled
 
 if TYPE_CHECKING:
@@ -567,7 +567,7 @@ def draw_gait(
 
     Examples
     --------
-    >>> from geomech.gaits import Circle
+    >>> from geomech.mathematics.gaits import Circle
     >>> from geomech.plots import draw_gait, figure
     >>> fig, axes = figure(3.0, 3.0)
     >>> ax = draw_gait(Circle(0.5), axes[0, 0])

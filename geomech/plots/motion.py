@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from geomech.core.variables import Result
-from geomech.geometry.field import Field
+from geomech.mathematics.geometry.representations.field import Field
+from geomech.mathematics.systems.base import body_size, length_unit, shape_labels
 from geomech.plots.maps import (
     ccf_map,
     draw_colours,
@@ -20,10 +21,9 @@ from geomech.plots.maps import (
 from geomech.plots.style import blank, figure, quantity, styled
 from geomech.results.fields import field_of
 from geomech.results.scenes import scene_of
-from geomech.studies.fields import angle_names
-from geomech.studies.motion import Motion
+from geomech.studies.maps.fields import angle_names
+from geomech.studies.mechanics.motion import Motion
 from geomech.studies.tables import poses
-from geomech.systems.base import body_size, length_unit, shape_labels
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from geomech.core.variables import Result
+from geomech.mathematics.systems.base import shape_labels
 from geomech.plots.maps import ccf_map, draw_arrow, shape_space
 from geomech.plots.stretched import stretched_map
 from geomech.plots.style import axes_of, figure, quantity, styled
 from geomech.results.fields import field_of, stretch_of
 from geomech.results.scenes import scene_of
-from geomech.studies.effort import units
-from geomech.systems.base import shape_labels
+from geomech.studies.estimates.effort import units
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,5 +1,5 @@
 """The CCF on shape space redrawn so that equal lengths on paper are equal path lengths
-(`geomech.geometry.stretch`)."""
+(`geomech.mathematics.geometry.stretch`)."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from geomech.gaits import Gait
-from geomech.geometry.field import Field
-from geomech.geometry.stretch import Stretch
+from geomech.mathematics.gaits import Gait
+from geomech.mathematics.geometry.representations.field import Field
+from geomech.mathematics.geometry.stretch import Stretch
 from geomech.plots.maps import (
     ANGLES,
     PHASES,
@@ -61,7 +61,7 @@ def stretched_map(
     Examples
     --------
     >>> import geomech
-    >>> from geomech.geometry.stretch import stretch
+    >>> from geomech.mathematics.geometry.stretch import stretch
     >>> study = geomech.study("three-link-viscous", grid=15).tables
     >>> plane = stretch(study.metric)
     >>> gait = study.scene.gait
@@ -203,7 +203,7 @@ def stretched_figure(
     Examples
     --------
     >>> import geomech
-    >>> from geomech.geometry.stretch import stretch
+    >>> from geomech.mathematics.geometry.stretch import stretch
     >>> study = geomech.study("three-link-viscous", grid=15).tables
     >>> plane = stretch(study.metric)
     >>> ccf = study.curvature

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from geomech.gaits import Gait
-from geomech.geometry.connection import Connection
-from geomech.geometry.field import Field
+from geomech.mathematics.gaits import Gait
+from geomech.mathematics.geometry.connection import Connection
+from geomech.mathematics.geometry.representations.field import Field
 from geomech.plots.maps import (
     ANGLES,
     PHASES,

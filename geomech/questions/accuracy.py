@@ -16,7 +16,7 @@ from rft.core.checks import in_range
 
 if TYPE_CHECKING:
     from geomech.scenes import Intruding, Scene, WalkerScene
-    from geomech.studies.accuracy import AccuracySubject
+    from geomech.studies.displacement.accuracy import AccuracySubject
 
 SHOWN = (
     "best_setting",
@@ -50,7 +50,7 @@ class Accuracy(Question):
 
     @cached_property
     def adjustable(self) -> "AccuracySubject":
-        from geomech.studies import accuracy
+        from geomech.studies.displacement import accuracy
 
         return accuracy.accuracy_subject(self.scene, self.runs)
 
@@ -63,7 +63,7 @@ class Accuracy(Question):
         return self.adjustable.cost()
 
     def compute(self, run: Run) -> Result:
-        from geomech.studies import accuracy
+        from geomech.studies.displacement import accuracy
 
         return accuracy.answer(self.adjustable, run.progress)
 

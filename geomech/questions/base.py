@@ -52,7 +52,7 @@ class Subject:
     """What a question is about, as its command's first argument: mostly a scene.
 
     load: returns it from its text and from the values of ``changes``, options of the
-    command that change it (`geomech.command.CHANGES`). names: returns those that a
+    command that change it (`geomech.shell.command.CHANGES`). names: returns those that a
     shell completes. default: what is taken where nothing is given; "" if it must be."""
 
     load: Callable[..., Any]

@@ -16,7 +16,7 @@ from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
     from geomech.scenes.model import Scene
-    from geomech.studies.shape_space import Plan
+    from geomech.studies.maps.shape_space import Plan
 
 SIGN = "positive for counter-clockwise loops"
 
@@ -70,7 +70,7 @@ class Ccf(Question):
         return self._plan(Run())
 
     def _plan(self, run: Run) -> "Plan":
-        from geomech.studies.shape_space import Plan
+        from geomech.studies.maps.shape_space import Plan
 
         tables = run.tables_of(self.scene)
         if self.sliced:
@@ -127,9 +127,9 @@ class Ccf(Question):
             )
 
     def compute(self, run: Run) -> Result:
-        from geomech.studies import fields, shape_space
-        from geomech.studies.effort import units
-        from geomech.systems.base import shape_labels
+        from geomech.mathematics.systems.base import shape_labels
+        from geomech.studies.estimates.effort import units
+        from geomech.studies.maps import fields, shape_space
 
         space = self._plan(run).compute(run.progress)
         facts = {
@@ -208,10 +208,10 @@ class Ccf(Question):
 
         On Axes that are given draw one component, x by default; return the Axes."""
         from geomech import plots
+        from geomech.mathematics.systems.base import shape_labels
         from geomech.results.fields import field_of, metric_of, slices_of, stretch_of
         from geomech.results.scenes import scene_of
-        from geomech.studies.effort import units
-        from geomech.systems.base import shape_labels
+        from geomech.studies.estimates.effort import units
 
         scene = scene_of(result)
         labels = shape_labels(scene.system)

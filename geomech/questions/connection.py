@@ -21,8 +21,8 @@ from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
     from geomech.scenes.model import Scene
+    from geomech.studies.maps.shape_space import Plan
     from geomech.studies.scene_tables import SceneTables
-    from geomech.studies.shape_space import Plan
 
 SHOWN = ("A",)
 
@@ -64,7 +64,7 @@ def with_contents(result: Result, ending: str, layout: str | None = None) -> Res
     """Return the result with all that a format has; what it lacks is computed again."""
     from geomech.io.tables import FORMATS
     from geomech.results.scenes import scene_of
-    from geomech.studies.fields import CONTENTS, contents
+    from geomech.studies.maps.fields import CONTENTS, contents
     from geomech.studies.scene_tables import SceneTables
 
     kind = contents(FORMATS[ending], layout)
@@ -86,7 +86,7 @@ class Connection(Question):
     pair: Pair = None
     slice: Slice = None
     compare_frame: OtherFrame = None
-    # Contents of files, of `geomech.studies.fields.CONTENTS`, and whether it is drawn.
+    # Contents of files, of `geomech.studies.maps.fields.CONTENTS`, and whether it is drawn.
     contents: tuple[str, ...] = field(default=(), kw_only=True)
     drawn: bool = field(default=False, kw_only=True)
 
@@ -118,8 +118,8 @@ class Connection(Question):
         return self._plan(Run())
 
     def _plan(self, run: Run) -> "Plan":
-        from geomech.studies.fields import WHOLE
-        from geomech.studies.shape_space import Plan
+        from geomech.studies.maps.fields import WHOLE
+        from geomech.studies.maps.shape_space import Plan
 
         file = ""
         if WHOLE in self.contents:
@@ -138,7 +138,7 @@ class Connection(Question):
 
     def for_files(self, paths: list[Path], options: dict[str, Any]) -> Question:
         from geomech.io.tables import FORMATS
-        from geomech.studies import fields
+        from geomech.studies.maps import fields
 
         found = []
         for path in paths:
@@ -172,7 +172,7 @@ class Connection(Question):
         choose("``style``", style, plots.CONNECTION_STYLES)
 
     def compute(self, run: Run) -> Result:
-        from geomech.studies import fields, shape_space
+        from geomech.studies.maps import fields, shape_space
 
         space = self._plan(run).compute(run.progress)
         tables = space.study
@@ -253,9 +253,9 @@ class Connection(Question):
 
         On Axes that are given draw one row, x by default; return the Axes."""
         from geomech import plots
+        from geomech.mathematics.systems.base import shape_labels
         from geomech.results.fields import connection_of, pairs_of, slices_of
         from geomech.results.scenes import scene_of
-        from geomech.systems.base import shape_labels
 
         labels = shape_labels(scene_of(result).system)
         options = {
@@ -285,7 +285,7 @@ class Connection(Question):
 def check_settings(scene: Any, ending: str, options: dict[str, Any]) -> None:
     """Refuse a file that cannot have what is asked of it."""
     from geomech.io.tables import FORMATS, LAYOUTS, ORDERS, SIGNS
-    from geomech.studies import fields
+    from geomech.studies.maps import fields
 
     file = FORMATS[ending]
     fields.check_joints(scene, file)
@@ -322,7 +322,7 @@ def cost_variables(balances: int, seconds: float) -> list[Any]:
 
 def facts_of(tables: "SceneTables") -> dict[str, Any]:
     """Return which entries of A follow from others, and whether its fit is exact."""
-    from geomech.systems.capabilities import stored_table
+    from geomech.mathematics.systems.capabilities import stored_table
 
     system = tables.scene.system
     is_exact = system.traits.linear and not stored_table(system, "connection")

@@ -17,7 +17,7 @@ from geomech.run.cost import Cost
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
-    from geomech.gaits import Gait
+    from geomech.mathematics.gaits import Gait
     from geomech.scenes.model import Scene
 
 EFFORT = ("path_length", "work", "cost_of_transport")
@@ -78,12 +78,12 @@ class Displacement(Question):
         if self.tolerance is not None and self.tiers is not None:
             raise Refusal("``tolerance`` chooses the tier", instead="drop ``tiers``")
         if self.effort:
-            from geomech.studies.effort import refuse_costless
+            from geomech.studies.estimates.effort import refuse_costless
 
             refuse_costless(self.scene)
 
     def cost(self) -> Cost:
-        from geomech.studies import cost
+        from geomech.studies.estimates import cost
 
         jobs = []
         if self.effort:
@@ -104,14 +104,14 @@ class Displacement(Question):
         else:
             found = self._cheapest(run)
         if self.effort:
-            from geomech.studies.effort import with_effort
+            from geomech.studies.estimates.effort import with_effort
 
             found = with_effort(found, self.scene, self.gait)
         return found
 
     def _cheapest(self, run: Run) -> Result:
-        from geomech.studies import cost
-        from geomech.studies.choose import cheapest_displacements
+        from geomech.studies.displacement.choose import cheapest_displacements
+        from geomech.studies.estimates import cost
 
         effort = []
         if self.effort:
@@ -260,7 +260,7 @@ def errors_of_others(result: Result) -> str:
 def shift_words(result: Result) -> Iterable[str]:
     """Yield how far uncertain media shift the mean of a quantity, where that
     matters."""
-    from geomech.studies.uncertainty import SMALLEST_SHIFT, SMALLEST_SPREAD
+    from geomech.studies.estimates.uncertainty import SMALLEST_SHIFT, SMALLEST_SPREAD
 
     length = result.attributes["body_length"]
     for k, name in enumerate(result["quantity"].values.tolist()):

@@ -13,7 +13,7 @@ from geomech.questions.common import Store
 from geomech.run.cost import Cost
 
 if TYPE_CHECKING:
-    from geomech.studies.grains import DraggedRod
+    from geomech.studies.grains.drag import DraggedRod
 
 SHOWN = ("mean_flank", "mean_ends", "mean_lift", "value", "end_caps")
 COLUMNS = (
@@ -109,7 +109,7 @@ class DragGrains(Question):
 
     @cached_property
     def study(self) -> "DraggedRod":
-        from geomech.studies.grains import DraggedRod
+        from geomech.studies.grains.drag import DraggedRod
 
         rod = DraggedRod(
             self.length,
@@ -126,7 +126,7 @@ class DragGrains(Question):
 
     @property
     def store_folder(self) -> Path:
-        from geomech.studies.grains import store_folder
+        from geomech.studies.grains.drag import store_folder
 
         return store_folder(self.store)
 

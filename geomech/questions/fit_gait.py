@@ -16,8 +16,8 @@ from rft.core.checks import in_range
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
-    from geomech.measured.log import Log
-    from geomech.measured.midlines.trial import Trial
+    from geomech.studies.measured.log import Log
+    from geomech.studies.measured.midlines.trial import Trial
 
 HELP = "table of joint angles, x, y, heading, or points of midlines"
 SCENE = ".toml"
@@ -149,7 +149,7 @@ class FitGait(Question):
     @cached_property
     def form(self) -> str:
         """What was measured: "log" or "midlines"."""
-        from geomech.measured import ask
+        from geomech.studies.measured import ask
 
         names = {*ask.OF_LOGS, *ask.OF_MIDLINES} - {"scene"}
         given = {name: getattr(self, name) for name in names}
@@ -178,8 +178,8 @@ class FitGait(Question):
         return self._of_midlines()
 
     def _of_log(self) -> Result:
-        from geomech.measured.fit import fit_log
-        from geomech.measured.results import fit_result
+        from geomech.studies.measured.fit import fit_log
+        from geomech.studies.measured.results import fit_result
 
         names = ("columns", "degrees", "level", "harmonics", "limits", "body_length")
         log: Any = self.file
@@ -187,9 +187,9 @@ class FitGait(Question):
         return fit_result(fit_log(log, **given), self.mapped)
 
     def _of_midlines(self) -> Result:
-        from geomech.measured.midlines.fit import fit_midlines
-        from geomech.measured.midlines.predicted import compare
-        from geomech.measured.midlines.results import trial_result
+        from geomech.studies.measured.midlines.fit import fit_midlines
+        from geomech.studies.measured.midlines.predicted import compare
+        from geomech.studies.measured.midlines.results import trial_result
 
         names = (
             "columns", "units", "scale", "fps", "y", "head", "least_score",

@@ -95,7 +95,7 @@ class FitMedium(Question):
 
     @cached_property
     def chosen_law(self) -> str:
-        from geomech.studies import calibration
+        from geomech.studies.terradynamics import calibration
 
         return calibration.chosen_law(self.drag, self.law)
 
@@ -103,7 +103,7 @@ class FitMedium(Question):
         _ = self.chosen_law  # refuses an unknown one
 
     def compute(self, run: Run) -> Result:
-        from geomech.studies import calibration
+        from geomech.studies.terradynamics import calibration
 
         given = {name: getattr(self, name) for name in SIZES}
         sizes = {name: size for name, size in given.items() if size is not None}

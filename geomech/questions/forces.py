@@ -15,7 +15,7 @@ from geomech.run.cost import Cost
 
 if TYPE_CHECKING:
     from geomech.scenes.model import Scene
-    from geomech.studies.newtons import Sizes
+    from geomech.studies.mechanics.newtons import Sizes
 
 PANELS = f"panels to draw, of {','.join(parsing.FORCE_PANELS)}"
 EQUAL = 1e-6  # relative difference up to which powers are called the same
@@ -48,22 +48,22 @@ class Forces(Question):
 
     @property
     def sizes(self) -> "Sizes":
-        from geomech.studies.newtons import Sizes
+        from geomech.studies.mechanics.newtons import Sizes
 
         return Sizes(self.length, self.radius, self.depth, self.stress, self.frequency)
 
     def check(self) -> None:
-        from geomech.studies import forces
+        from geomech.studies.mechanics import forces
 
         forces.check(self.scene, self.sizes)
 
     def cost(self) -> Cost:
-        from geomech.studies import forces
+        from geomech.studies.mechanics import forces
 
         return forces.cost(self.scene)
 
     def compute(self, run: Run) -> Result:
-        from geomech.studies import forces
+        from geomech.studies.mechanics import forces
 
         return forces.answer(self.scene, self.sizes)
 

@@ -12,7 +12,7 @@ from geomech.run.cost import Cost
 
 if TYPE_CHECKING:
     from geomech.scenes.model import Scene
-    from geomech.studies.grain_swim import GrainSwim
+    from geomech.studies.grains.swim import GrainSwim
 
 SHOWN = ("x", "y", "heading", "cycle_x", "cycle_y", "cycle_heading", "work")
 
@@ -54,7 +54,7 @@ class Grains(Question):
 
     @cached_property
     def study(self) -> "GrainSwim":
-        from geomech.studies.grain_swim import GrainSwim
+        from geomech.studies.grains.swim import GrainSwim
 
         return GrainSwim(
             self.scene,

@@ -12,7 +12,7 @@ from geomech.questions.base import Question, Run, Subject
 from geomech.run.cost import Cost
 
 if TYPE_CHECKING:
-    from geomech.scenes.intruding import Intruding
+    from geomech.scenes.terradynamics.intruding import Intruding
 
 ROUNDING = 1e-12  # over the largest force or moment
 
@@ -29,12 +29,12 @@ class Intrude(Question):
     unlimited: ClassVar[bool] = True  # it takes seconds at most
 
     def cost(self) -> Cost:
-        from geomech.studies import intrusion
+        from geomech.studies.terradynamics import intrusion
 
         return intrusion.cost(self.scene)
 
     def compute(self, run: Run) -> Result:
-        from geomech.studies import intrusion
+        from geomech.studies.terradynamics import intrusion
 
         return intrusion.answer(self.scene)
 

@@ -16,8 +16,8 @@ from geomech.run.cost import Cost
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
-    from geomech.optimisation.request import Request
     from geomech.scenes.model import Scene
+    from geomech.studies.optimisation.request import Request
 
 SHOWN = ("x", "y", "heading", "path_length", "work", "frequency")
 ANSWERS = ("answer", "answer_value", "answer_starts", "answer_how")
@@ -85,7 +85,7 @@ class Optimize(Question):
 
     @cached_property
     def request(self) -> "Request":
-        from geomech.optimisation.request import build_request
+        from geomech.studies.optimisation.request import build_request
 
         return build_request(
             self.scene,
@@ -106,7 +106,7 @@ class Optimize(Question):
         return replace(self, mapped=True, stretched=stretch)
 
     def check(self) -> None:
-        from geomech.optimisation.variables import check_stretch
+        from geomech.studies.optimisation.variables import check_stretch
 
         _ = self.request  # refuses what makes no sense
         if self.stretched:
@@ -116,9 +116,9 @@ class Optimize(Question):
         return self.request.cost()
 
     def compute(self, run: Run) -> Result:
-        from geomech.optimisation import search, variables
-        from geomech.studies.effort import units
-        from geomech.studies.fields import stretch_variables
+        from geomech.studies.estimates.effort import units
+        from geomech.studies.maps.fields import stretch_variables
+        from geomech.studies.optimisation import search, variables
 
         optimum = search(self.request, run.progress)
         found = variables.variables(optimum)

@@ -22,7 +22,7 @@ def amplitudes(text: str, scene: Any, flag: str) -> tuple[float, ...]:
 
 def tiers(text: str, scene: Any, flag: str) -> tuple[str, ...]:
     """Return the names in path,direct."""
-    from geomech.tiers import TIERS
+    from geomech.mathematics.tiers import TIERS
 
     words = [word.strip() for word in text.split(",")]
     return tuple(choose("``tiers``", word, TIERS) for word in words)

@@ -163,10 +163,10 @@ def save_maps(result: Result, folder: Path, component: Any, clim: Any) -> None:
     """Draw the connection and the CCF, of three joints for every pair, and the frame
     that was chosen, if it is one of those."""
     from geomech import plots
+    from geomech.mathematics.systems.base import shape_labels
     from geomech.results.fields import connection_of, field_of, slices_of
     from geomech.results.scenes import scene_of
     from geomech.studies.report import compared_gaits
-    from geomech.systems.base import shape_labels
 
     scene = scene_of(result)
     labels = shape_labels(scene.system)

@@ -43,12 +43,12 @@ class Stress(Question):
         return replace(self, drawn=True)
 
     def check(self) -> None:
-        from geomech.studies import stress
+        from geomech.studies.terradynamics import stress
 
         stress.check(self.beta, self.gamma, self.drawn)
 
     def compute(self, run: Run) -> Result:
-        from geomech.studies import stress
+        from geomech.studies.terradynamics import stress
 
         return stress.answer(self.medium, self.beta, self.gamma, self.drawn)
 
@@ -73,6 +73,6 @@ class Stress(Question):
     def draw(result: Result) -> Any:
         """Draw the stress map with the plate of the question; return the Figure."""
         from geomech import plots
-        from geomech.studies import stress
+        from geomech.studies.terradynamics import stress
 
         return plots.stress_figure(*stress.drawn(result))

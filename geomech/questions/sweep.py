@@ -15,7 +15,7 @@ from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
     from geomech.scenes.model import Scene
-    from geomech.studies.sweep import Plan
+    from geomech.studies.displacement.sweep import Plan
 
 SHOWN = ("net_distance", "speed", "status")
 LARGEST_DRAWN = 2  # parameters of a figure
@@ -45,7 +45,7 @@ class Sweep(Question):
 
     @cached_property
     def plan(self) -> "Plan":
-        from geomech.studies.sweep import Plan
+        from geomech.studies.displacement.sweep import Plan
 
         return Plan(self.scene, self.over)
 
@@ -63,7 +63,7 @@ class Sweep(Question):
         return self.plan.cost
 
     def compute(self, run: Run) -> "Result":
-        from geomech.studies.sweep import store_batches
+        from geomech.studies.displacement.sweep import store_batches
 
         seconds = None
         if "cost" in vars(self.plan):  # a command has asked for it

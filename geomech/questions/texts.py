@@ -116,7 +116,7 @@ def no_degrees_of_amplitude(scene: Any) -> str | None:
 
 def no_degrees_of(scene: Any, parameter: str) -> str | None:
     """Return why degrees are refused for a parameter of a scene
-    (`geomech.studies.sweep`); None if it is an angle."""
+    (`geomech.studies.displacement.sweep`); None if it is an angle."""
     if not hasattr(scene, "robot"):
         if parameter == "gait.amplitude":
             return no_degrees_of_amplitude(scene)
@@ -151,7 +151,7 @@ def parts_of(scene: Any, section: str) -> list[Any]:
 
 def is_angle(part: Any, key: str) -> bool:
     """Return whether a key of a part of a scene is an angle."""
-    from geomech.scenes.key import angles_of
+    from geomech.scenes.format.key import angles_of
 
     kind: Any = type(part)
     return key in angles_of(kind)
@@ -293,9 +293,9 @@ def is_limit(text: str, in_percent: bool) -> bool:
 
 
 def measurements(path: Path | None, scene: Any, panels: Sequence[str]) -> Any:
-    """Return what `geomech.scenes.measurements` reads of the quantity of one panel, x
+    """Return what `geomech.scenes.data.measurements` reads of the quantity of one panel, x
     if none is named; None without a file."""
-    from geomech.scenes.measurements import read
+    from geomech.scenes.data.measurements import read
 
     if path is None:
         return None

@@ -115,6 +115,6 @@ def check_films(paths: Iterable[Path]) -> None:
     """Refuse films that nothing here can write."""
     for path in paths:
         if is_film(path):
-            from geomech import films
+            from geomech.plots import films
 
             films.check_format(path)

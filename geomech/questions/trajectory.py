@@ -21,7 +21,7 @@ WITHOUT_MAP = (".csv", ".txt")  # files from which nothing is drawn
 
 def write_film(path: Path, result: Result) -> None:
     """Write a film of the motion."""
-    from geomech import films
+    from geomech.plots import films
 
     films.write_motion(path, result)
 
@@ -69,24 +69,24 @@ class Trajectory(Question):
         return replace(self, mapped=True)
 
     def check(self) -> None:
-        from geomech.studies import motion
+        from geomech.studies.mechanics import motion
 
         motion.refuse_cycles(self.count)
 
     def cost(self) -> Cost:
-        from geomech.studies import motion
+        from geomech.studies.mechanics import motion
 
         cost = motion.cost(self.scene, self.count, self.mapped)
         if not self.filmed:
             return cost
-        from geomech import films
+        from geomech.plots import films
 
         phases = self.scene.numerics.phases
         frequency = motion.frequency_of(self.scene)
         return motion.summed([cost, films.cost(phases, self.count, frequency)])
 
     def compute(self, run: Run) -> Result:
-        from geomech.studies import motion
+        from geomech.studies.mechanics import motion
 
         tables = run.tables_of(self.scene)
         return motion.answer(tables, self.count, self.mapped, run.shown_progress)

@@ -37,7 +37,7 @@ class Velocity(Question):
         )
 
     def compute(self, run: Run) -> Result:
-        from geomech.studies.single import velocity
+        from geomech.studies.mechanics.single import velocity
 
         with located(self.scene.name):
             found = velocity(self.scene.system, self.alpha, self.alphadot)

@@ -16,7 +16,7 @@ from geomech.results.show import scalar
 from geomech.run.cost import LONGEST, Cost
 
 if TYPE_CHECKING:
-    from geomech.scenes.walker import WalkerScene
+    from geomech.scenes.terradynamics.walker import WalkerScene
 
 WALKING = "walking"  # status of a robot that neither sank nor fell
 ANGLES = {"pitch": "nose down", "roll": "left side up", "yaw": "turning left"}
@@ -31,7 +31,7 @@ def write_film(
     ),
 ) -> None:
     """Write a film of the walk."""
-    from geomech import films
+    from geomech.plots import films
 
     films.write_walk(path, result, follow)
 
@@ -50,7 +50,7 @@ class Walk(Question):
     table: ClassVar[tuple[str, ...]] = ("t",)
 
     def check(self) -> None:
-        from geomech.studies import walking
+        from geomech.studies.terradynamics import walking
 
         walking.refuse_engine(self.scene, self.engine)
 
@@ -59,12 +59,12 @@ class Walk(Question):
         return self
 
     def cost(self) -> Cost:
-        from geomech.studies import walking
+        from geomech.studies.terradynamics import walking
 
         return walking.walk_cost(self.scene, engine_name=self.engine)
 
     def compute(self, run: Run) -> Result:
-        from geomech.studies import walking
+        from geomech.studies.terradynamics import walking
 
         longest = math.inf
         if run.limited:
@@ -135,7 +135,7 @@ class Walk(Question):
 
 def settling_words(result: Result) -> str:
     """Return the time that a robot takes from rest to the limit cycle, in words."""
-    from geomech.studies.walking import NEAR
+    from geomech.studies.terradynamics.walking import NEAR
 
     if "settling_time" not in result:
         return ""

@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 
 from geomech.core.variables import Result, Variable
-from geomech.geometry.connection import Connection
-from geomech.geometry.field import Field
-from geomech.geometry.metric import Finsler, Metric
-from geomech.geometry.stretch import Stretch
+from geomech.mathematics.geometry.connection import Connection
+from geomech.mathematics.geometry.metric import Finsler, Metric
+from geomech.mathematics.geometry.representations.field import Field
+from geomech.mathematics.geometry.stretch import Stretch
 
 
 @dataclass(frozen=True, eq=False)
 class Slice:
-    """A plane of shape space as a result has it (`geomech.geometry.plane.Plane`)."""
+    """A plane of shape space as a result has it (`geomech.mathematics.geometry.representations.plane.Plane`)."""
 
     pair: tuple[int, int]
     at: tuple[float, ...]
@@ -110,7 +110,7 @@ def pairs_of(result: Result, name: str) -> list[tuple[str, tuple[int, int]]]:
 
 def stretch_of(result: Result) -> Stretch:
     """Return the stretched shape space of a result
-    (`geomech.studies.fields.stretch_variables`)."""
+    (`geomech.studies.maps.fields.stretch_variables`)."""
     shape = result["stretched_shape"]
     degree = int(result["stretch_interpolation"].values)
     return Stretch(

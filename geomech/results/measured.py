@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from geomech.core.variables import Result
-from geomech.gaits import Fourier
-from geomech.geometry.tube import Loop, TaylorSeries
+from geomech.mathematics.gaits import Fourier
+from geomech.mathematics.geometry.representations.tube import Loop, TaylorSeries
 from geomech.scenes.write import gait_table, table
 from rft.core.refusal import Refusal
 
@@ -37,10 +37,10 @@ def fitted_gait(result: Result) -> Fourier:
     --------
     >>> import pathlib, tempfile
     >>> import geomech
-    >>> from geomech.measured import synthetic
+    >>> from geomech.studies.measured import synthetic
     >>> velocity = geomech.load("three-link-viscous").system.velocity
     >>> file = pathlib.Path(tempfile.mkdtemp()) / "log.csv"
-    >>> gait = geomech.gaits.Circle(0.8)
+    >>> gait = geomech.mathematics.gaits.Circle(0.8)
     >>> synthetic.save(file, synthetic.synthetic_log(velocity, gait, cycles=20, seed=1))
     >>> geomech.fitted_gait(geomech.fit_gait(file, harmonics=2)).joints
     2

@@ -39,7 +39,7 @@ def fitted_medium(result: Result) -> Any:
     >>> sand = geomech.fitted_medium(geomech.fit_medium("short-rod-drag"))
     >>> round(sand.C, 2), round(sand.gamma0, 2)
     (1.49, 0.22)
-    >>> chain, circle = geomech.bodies.Chain(), geomech.gaits.Circle(1.0)
+    >>> chain, circle = geomech.bodies.Chain(), geomech.mathematics.gaits.Circle(1.0)
     >>> moved = geomech.study(sand, chain, circle).displacement(tiers="direct")
     >>> moved["net_distance"].values.round(3)
     array([[0.05]])

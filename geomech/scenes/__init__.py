@@ -18,10 +18,10 @@ from geomech.scenes.read import (
 from geomech.scenes.write import tables, toml
 
 if TYPE_CHECKING:
-    from geomech.scenes.intruder import IntruderScene
-    from geomech.scenes.intruding import Intruding
-    from geomech.scenes.solid import MeshScene
-    from geomech.scenes.walker import WalkerScene
+    from geomech.scenes.terradynamics.intruder import IntruderScene
+    from geomech.scenes.terradynamics.intruding import Intruding
+    from geomech.scenes.terradynamics.solid import MeshScene
+    from geomech.scenes.terradynamics.walker import WalkerScene
 
 __all__ = [
     "IntruderScene",

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from geomech.geometry import connection
-from geomech.systems.base import System
-from geomech.systems.framed import NAME, Framed
-from geomech.systems.table import Table
-from geomech.tiers.base import Numerics
-from geomech.tiers.fitted import LARGEST_FIELD, LARGEST_GRID, directions
+from geomech.mathematics.geometry import connection
+from geomech.mathematics.systems.base import System
+from geomech.mathematics.systems.framed import NAME, Framed
+from geomech.mathematics.systems.table import Table
+from geomech.mathematics.tiers.base import Numerics
+from geomech.mathematics.tiers.fitted import LARGEST_FIELD, LARGEST_GRID, directions
 from rft.core.refusal import Refusal
 
 

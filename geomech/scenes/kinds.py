@@ -17,10 +17,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from geomech import gaits, systems, tiers  # noqa: F401  which have registries
 from geomech.io.files import read_text
+from geomech.mathematics import gaits, systems, tiers  # noqa: F401  which have registries
+from geomech.mathematics.systems.functions import class_from_function
 from geomech.scenes import sources
-from geomech.systems.functions import class_from_function
 from rft.core.refusal import Refusal, formatted, located
 from rft.core.registry import REGISTRIES, Registry, home, place
 
@@ -51,7 +51,7 @@ def register(part: Any = None, /, **members: Any) -> Any:
     ...     xi_x = alphadot[..., 0] * np.sin(alpha[..., 1])
     ...     return np.stack([xi_x, 0 * xi_x, 0 * xi_x], -1)
     ...
-    >>> study = geomech.study(drift, geomech.gaits.Circle(0.5))
+    >>> study = geomech.study(drift, geomech.mathematics.gaits.Circle(0.5))
     >>> table = study.displacement(tiers="direct")
     >>> table["net_distance"].values.round(3)
     array([[0.761]])
@@ -78,8 +78,8 @@ def registry_of(part: Any) -> Registry:
         "and `length`, a system one with `velocity`, `joints`, `length` and `traits`, "
         "or a function velocity(alpha, alphadot) with joints = ...; a function "
         "positions(alpha) with joints and lengths = ... is a body; a gait is derived "
-        "from geomech.gaits.Gait, an effect from rft.effects.Effect",
-        instead="a tier is a geomech.tiers.Tier",
+        "from geomech.mathematics.gaits.Gait, an effect from rft.effects.Effect",
+        instead="a tier is a geomech.mathematics.tiers.Tier",
     )
 
 

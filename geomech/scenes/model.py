@@ -11,16 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geomech.core.errors import choose
-from geomech.gaits import KINDS as GAITS
-from geomech.gaits import Gait
-from geomech.geometry.gait import checked_gait
-from geomech.scenes.frames import reframed
-from geomech.scenes.key import text_key
-from geomech.scenes.medium import MEDIUM
-from geomech.scenes.sections import Each, Keys, OneOf
-from geomech.scenes.sizes import Physical
-from geomech.systems import KINDS as SYSTEMS
-from geomech.systems.base import (
+from geomech.mathematics.gaits import KINDS as GAITS
+from geomech.mathematics.gaits import Gait
+from geomech.mathematics.geometry.gait import checked_gait
+from geomech.mathematics.systems import KINDS as SYSTEMS
+from geomech.mathematics.systems.base import (
     Cycle,
     System,
     as_system,
@@ -28,9 +23,14 @@ from geomech.systems.base import (
     note_angles,
     unwrapped,
 )
-from geomech.systems.capabilities import solver_of, with_solver
-from geomech.systems.swimmer import PARTS, Swimmer, note_radius
-from geomech.tiers.base import Numerics
+from geomech.mathematics.systems.capabilities import solver_of, with_solver
+from geomech.mathematics.systems.swimmer import PARTS, Swimmer, note_radius
+from geomech.mathematics.tiers.base import Numerics
+from geomech.scenes.format.key import text_key
+from geomech.scenes.format.sections import Each, Keys, OneOf
+from geomech.scenes.format.sizes import Physical
+from geomech.scenes.frames import reframed
+from geomech.scenes.medium import MEDIUM
 from rft.core.refusal import Refusal, formatted, located, printable
 
 FRAME = (
@@ -74,9 +74,9 @@ class Scene(SceneRepr):
 
     Examples
     --------
-    >>> from geomech.gaits import Circle
+    >>> from geomech.mathematics.gaits import Circle
     >>> from geomech.scenes import Scene
-    >>> from geomech.systems import NoSlipSnake
+    >>> from geomech.mathematics.systems import NoSlipSnake
     >>> scene = Scene(NoSlipSnake(), Circle(0.3, centre=(0.7, -0.7)))
     >>> scene.system.joints, scene.numerics.phases
     (2, 256)

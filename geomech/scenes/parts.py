@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from geomech.gaits import Circle, Gait, Wave
+from geomech.mathematics.gaits import Circle, Gait, Wave
+from geomech.mathematics.systems.base import System, as_system
+from geomech.mathematics.systems.swimmer import Swimmer
 from geomech.scenes.model import Scene
 from geomech.scenes.read import load, medium_of
-from geomech.systems.base import System, as_system
-from geomech.systems.swimmer import Swimmer
 from rft.core.refusal import Refusal, formatted
 
 FORMS = (

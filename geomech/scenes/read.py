@@ -13,16 +13,17 @@ from geomech.io.files import note, read_text
 from geomech.io.foreign import refuse_program
 from geomech.io.rows import ENDINGS
 from geomech.io.toml import tables_of
-from geomech.scenes import hints, reader, swimming
+from geomech.mathematics.systems.base import kind_of
+from geomech.mathematics.systems.swimmer import MEDIA, Swimmer
+from geomech.scenes import swimming
+from geomech.scenes.format import hints, reader
 from geomech.scenes.medium import MEDIUM
 from geomech.scenes.model import Scene, checked_scene
-from geomech.systems.base import kind_of
-from geomech.systems.swimmer import MEDIA, Swimmer
 from rft.core.refusal import Refusal, formatted
 
 if TYPE_CHECKING:
-    from geomech.scenes.intruding import Intruding
-    from geomech.scenes.walker import WalkerScene
+    from geomech.scenes.terradynamics.intruding import Intruding
+    from geomech.scenes.terradynamics.walker import WalkerScene
 
 LARGEST = 10_000_000  # bytes of a scene file
 PIPE = "pipe"  # name of a scene from a pipe, such as /dev/stdin or <(...)
@@ -161,7 +162,7 @@ def medium_of(name: str | Path) -> Any:
 def medium_in(text: str) -> Any:
     """Return the medium in the text of a file as `geomech fit-medium` writes it: a law,
     or a map of stress in the vertical plane."""
-    from geomech.scenes.stress import StressKeys
+    from geomech.scenes.terradynamics.stress import StressKeys
 
     source = reader.Source("medium")
     table = tables_of(text)["medium"]
@@ -233,8 +234,8 @@ def parse(text: str, name: str = "scene") -> Scene | Any:
 
 def _intruding(tables: Mapping, name: str) -> type[Intruding]:
     """Return the class of an intruder scene, by the kind of its body."""
-    from geomech.scenes.intruder import OUTLINES, IntruderScene
-    from geomech.scenes.solid import KINDS, MeshScene
+    from geomech.scenes.terradynamics.intruder import OUTLINES, IntruderScene
+    from geomech.scenes.terradynamics.solid import KINDS, MeshScene
 
     body = tables.get("intruder")
     kind = body.get("kind") if isinstance(body, Mapping) else None
@@ -261,7 +262,7 @@ def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | An
             "a scene is a dict of tables", value=tables, where=formatted(name)
         )
     if "robot" in tables:
-        from geomech.scenes.walker import WalkerScene, with_implied_names
+        from geomech.scenes.terradynamics.walker import WalkerScene, with_implied_names
 
         return reader.read(WalkerScene, with_implied_names(tables, name), name, text)
     if {"intruder", "motion"} & {*tables}:

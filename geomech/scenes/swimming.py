@@ -8,17 +8,17 @@ from collections.abc import Mapping
 from typing import Any
 
 from geomech.core.errors import choose
-from geomech.scenes import reader
+from geomech.mathematics.systems import KINDS as SYSTEMS
+from geomech.mathematics.systems.base import System
+from geomech.mathematics.systems.capabilities import solver_of
+from geomech.mathematics.systems.framed import NAME as FITTED
+from geomech.mathematics.tiers.base import Numerics
+from geomech.scenes.format import reader
+from geomech.scenes.format.key import spellings
+from geomech.scenes.format.sections import sections_of
+from geomech.scenes.format.sizes import Sizes
 from geomech.scenes.frames import framed
-from geomech.scenes.key import spellings
 from geomech.scenes.model import SHORT, SWIMMER, Scene
-from geomech.scenes.sections import sections_of
-from geomech.scenes.sizes import Sizes
-from geomech.systems import KINDS as SYSTEMS
-from geomech.systems.base import System
-from geomech.systems.capabilities import solver_of
-from geomech.systems.framed import NAME as FITTED
-from geomech.tiers.base import Numerics
 from rft.core.refusal import Refusal, located
 
 

@@ -10,12 +10,14 @@ import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from geomech.gaits import Circle, Gait
-from geomech.scenes.key import angles_of, key_fields
-from geomech.scenes.medium import MEDIUM
-from geomech.scenes.model import SWIMMER, Scene, checked_scene
-from geomech.scenes.read import from_tables
-from geomech.scenes.sections import (
+from geomech.mathematics.gaits import Circle, Gait
+from geomech.mathematics.systems.base import unwrapped
+from geomech.mathematics.systems.capabilities import solver_of
+from geomech.mathematics.systems.framed import Framed
+from geomech.mathematics.systems.swimmer import Swimmer, name_in
+from geomech.mathematics.systems.table import Table
+from geomech.scenes.format.key import angles_of, key_fields
+from geomech.scenes.format.sections import (
     Each,
     Keys,
     Section,
@@ -23,16 +25,14 @@ from geomech.scenes.sections import (
     sections_of,
     variants,
 )
-from geomech.systems.base import unwrapped
-from geomech.systems.capabilities import solver_of
-from geomech.systems.framed import Framed
-from geomech.systems.swimmer import Swimmer, name_in
-from geomech.systems.table import Table
+from geomech.scenes.medium import MEDIUM
+from geomech.scenes.model import SWIMMER, Scene, checked_scene
+from geomech.scenes.read import from_tables
 from rft.core.refusal import Refusal, located
 
 if TYPE_CHECKING:
-    from geomech.scenes.intruding import Intruding
-    from geomech.scenes.walker import WalkerScene
+    from geomech.scenes.terradynamics.intruding import Intruding
+    from geomech.scenes.terradynamics.walker import WalkerScene
 
 COMMENT_WIDTH = 110  # characters of a line of comments, without the mark
 
@@ -49,7 +49,7 @@ def toml(scene: Scene | Intruding | WalkerScene) -> str:
     --------
     >>> import geomech
     >>> medium = geomech.media.Viscous(3.0)
-    >>> gait = geomech.gaits.Circle(0.5)
+    >>> gait = geomech.mathematics.gaits.Circle(0.5)
     >>> scene = geomech.study(medium, geomech.bodies.Chain(), gait).scene
     >>> print(geomech.toml(scene).partition("[body]")[0].strip())
     [medium]

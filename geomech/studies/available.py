@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from geomech.systems.base import System
-from geomech.tiers import TIERS
+from geomech.mathematics.systems.base import System
+from geomech.mathematics.tiers import TIERS
 
 
 def available_tiers(system: System) -> tuple[str, ...]:

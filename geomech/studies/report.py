@@ -11,27 +11,28 @@ from itertools import combinations
 import numpy as np
 
 from geomech.core.variables import Result, Variable
-from geomech.gaits import Butterfly, Circle, Gait
+from geomech.mathematics.gaits import Butterfly, Circle, Gait
+from geomech.mathematics.systems.base import System, refuse_singular
+from geomech.mathematics.systems.capabilities import near_gait
+from geomech.mathematics.systems.swimmer import is_three_link
+from geomech.mathematics.tiers.area import AREA
+from geomech.mathematics.tiers.fitted import axes as field_axes
+from geomech.mathematics.tiers.fitted import is_too_large
+from geomech.mathematics.tiers.path import PATH
 from geomech.run.cost import Cost
 from geomech.scenes.model import Scene
-from geomech.studies import effort, fields, shape_space
 from geomech.studies.available import default_tiers
-from geomech.studies.cost import (
+from geomech.studies.estimates import effort
+from geomech.studies.estimates.cost import (
     Job,
     even_part_jobs,
     metric_jobs,
     plane_jobs,
     total_cost,
 )
-from geomech.studies.cost import study_jobs as jobs
+from geomech.studies.estimates.cost import study_jobs as jobs
+from geomech.studies.maps import fields, shape_space
 from geomech.studies.scene_tables import SceneTables
-from geomech.systems.base import System, refuse_singular
-from geomech.systems.capabilities import near_gait
-from geomech.systems.swimmer import is_three_link
-from geomech.tiers.area import AREA
-from geomech.tiers.fitted import axes as field_axes
-from geomech.tiers.fitted import is_too_large
-from geomech.tiers.path import PATH
 from rft.core.refusal import Refusal, located
 
 N_AMPLITUDES = 10  # or so, for each gait

@@ -15,27 +15,28 @@ from numpy.typing import ArrayLike
 
 from geomech.core.errors import choose
 from geomech.core.variables import Result
-from geomech.gaits import Gait
-from geomech.geometry.connection import Connection, even_part
-from geomech.geometry.curvature import ccf
-from geomech.geometry.curvature import error as ccf_error
-from geomech.geometry.field import Field, inside
-from geomech.geometry.gait import checked_gait
-from geomech.geometry.harmonics import Harmonics
-from geomech.geometry.metric import Finsler, Metric
-from geomech.geometry.plane import Plane
-from geomech.geometry.two_form import TwoForm, two_form
+from geomech.mathematics.gaits import Gait
+from geomech.mathematics.geometry.connection import Connection, even_part
+from geomech.mathematics.geometry.curvature import ccf
+from geomech.mathematics.geometry.curvature import error as ccf_error
+from geomech.mathematics.geometry.gait import checked_gait
+from geomech.mathematics.geometry.metric import Finsler, Metric
+from geomech.mathematics.geometry.representations.field import Field, inside
+from geomech.mathematics.geometry.representations.harmonics import Harmonics
+from geomech.mathematics.geometry.representations.plane import Plane
+from geomech.mathematics.geometry.two_form import TwoForm, two_form
+from geomech.mathematics.systems.base import body_size, refuse_singular, shape_labels
+from geomech.mathematics.systems.capabilities import gaits_per_batch, stored_table
+from geomech.mathematics.systems.framed import NAME as MINIMUM_PERTURBATION
+from geomech.mathematics.systems.framed import in_frame
+from geomech.mathematics.tiers import TIERS, fitted, harmonic
+from geomech.mathematics.tiers.base import Plan, Table, Tier, in_groups
 from geomech.run.progress import progress as shown_progress
 from geomech.scenes.frames import framed
 from geomech.scenes.model import Scene, frequency_of
-from geomech.studies import cost, effort, estimate, tables, uncertainty
+from geomech.studies import tables
 from geomech.studies.available import available_tiers, default_tiers
-from geomech.systems.base import body_size, refuse_singular, shape_labels
-from geomech.systems.capabilities import gaits_per_batch, stored_table
-from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
-from geomech.systems.framed import in_frame
-from geomech.tiers import TIERS, fitted, harmonic
-from geomech.tiers.base import Plan, Table, Tier, in_groups
+from geomech.studies.estimates import cost, effort, estimate, uncertainty
 from rft.core.checks import real_array
 from rft.core.refusal import Refusal, located
 
@@ -209,7 +210,7 @@ class SceneTables:
     ) -> Plane:
         """Return a plane of shape space in which two joints move, counted from 0,
         through a shape or the gait's middle: the CCF of that pair, without a field of
-        all joints (`geomech.geometry.plane`)."""
+        all joints (`geomech.mathematics.geometry.representations.plane`)."""
         scene = self.scene
         joints = cast(tuple[int, int], tuple(pair))
         through: Any = scene.gait.middle if shape is None else shape
@@ -238,7 +239,7 @@ class SceneTables:
 
     @property
     def two_form(self) -> TwoForm:
-        """CCF of all pairs of joints, of any number (`geomech.geometry.two_form`)."""
+        """CCF of all pairs of joints, of any number (`geomech.mathematics.geometry.two_form`)."""
         key = self._connection_table().key
         return self._stored("two-form", key, lambda: two_form(self.fitted)).table
 
@@ -258,7 +259,7 @@ class SceneTables:
 
     @property
     def metric(self) -> Metric | Finsler:
-        """Cost of changes of shape on the field's grid (`geomech.geometry.metric`): a
+        """Cost of changes of shape on the field's grid (`geomech.mathematics.geometry.metric`): a
         quadratic form where xi = A alphadot, else a norm. Refusal if the system has
         none."""
         return self.compute_metric()
@@ -294,7 +295,7 @@ class SceneTables:
         self, gait: Gait | None = None, amplitudes: ArrayLike | None = None
     ) -> dict[str, np.ndarray]:
         """Return path length and work of a gait, or the scene's own, with their errors:
-        see `geomech.studies.effort.effort`."""
+        see `geomech.studies.estimates.effort.effort`."""
         with located(self.scene.name):
             self.scene.note_turns(self._gait(gait), amplitudes)
             return effort.effort(self.scene, gait, amplitudes)
@@ -346,7 +347,7 @@ class SceneTables:
         progress: Callable | None = None,
     ) -> Result:
         """Return the net poses (`geomech.studies.tables.displacement_result`) by tiers of TIERS
-        (`default_tiers` if None), with their errors (`geomech.studies.estimate`).
+        (`default_tiers` if None), with their errors (`geomech.studies.estimates.estimate`).
 
         seconds, by part: time to build each table ("field", "harmonic table" ...), even
         if it was built before, and time of each tier from there, of the direct one with
@@ -442,7 +443,7 @@ class SceneTables:
         more: Sequence[cost.Job] = (),
     ) -> cost.Cost:
         """Return the cost of `displacements`, and of ``more`` jobs: force balances,
-        seconds on this machine and memory; see `geomech.studies.cost`."""
+        seconds on this machine and memory; see `geomech.studies.estimates.cost`."""
         gait, values, plans = self._checked_request(
             gait, amplitudes, tiers, CHECKED_AMPLITUDES, CHECKED_PHASES
         )

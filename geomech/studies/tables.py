@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from geomech.core.variables import Result, Variable
-from geomech.gaits import Gait
-from geomech.geometry.gait import loop_area
-from geomech.geometry.symmetry import zero_components
+from geomech.mathematics.gaits import Gait
+from geomech.mathematics.geometry.gait import loop_area
+from geomech.mathematics.geometry.symmetry import zero_components
+from geomech.mathematics.systems.base import body_size, length_unit
 from geomech.scenes.model import Scene, frequency_of
-from geomech.systems.base import body_size, length_unit
 
 COMPONENTS = ("x", "y", "theta")  # of a velocity in the body frame
 QUANTITIES = ("x", "y", "heading", "net_distance")  # of a pose
@@ -103,9 +103,9 @@ def displacement_result(
     """Return the net poses (B, 3) of a gait by tier as a result; lengths are in the
     system's unit.
 
-    errors: (B, 2) by tier, as `geomech.studies.estimate` gives them, in body lengths and
+    errors: (B, 2) by tier, as `geomech.studies.estimates.estimate` gives them, in body lengths and
     rad. medium: what the uncertainty of the medium does to the true displacement, and so
-    to every tier's (`geomech.studies.uncertainty.medium_spread`), or None. choices: (B, 2),
+    to every tier's (`geomech.studies.estimates.uncertainty.medium_spread`), or None. choices: (B, 2),
     the system's unit and rad, of tiers whose answer depends on the surface that a loop of
     three and more joints spans. more: variables, such as the seconds that parts took.
     facts: attributes."""

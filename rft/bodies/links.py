@@ -117,7 +117,7 @@ class Links:
         """Return the pose h of another frame of this body in the body frame, and dh/dt:
         each (..., 3), in length units and rad.
 
-        alpha, alphadot: (..., joints). `geomech.geometry.coordinates` uses it to change
+        alpha, alphadot: (..., joints). `geomech.mathematics.geometry.coordinates` uses it to change
         the frame of velocities and connections.
         """
         alpha, alphadot = np.broadcast_arrays(

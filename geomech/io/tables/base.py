@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from geomech.geometry.connection import Connection
-from geomech.geometry.harmonics import Harmonics
-from geomech.geometry.metric import Finsler, Metric
-from geomech.geometry.reconstruct import displacement
-from geomech.geometry.tube import Tube
+from geomech.mathematics.geometry.connection import Connection
+from geomech.mathematics.geometry.metric import Finsler, Metric
+from geomech.mathematics.geometry.reconstruct import displacement
+from geomech.mathematics.geometry.representations.harmonics import Harmonics
+from geomech.mathematics.geometry.representations.tube import Tube
 from rft.core.refusal import Refusal, printable
 from rft.core.registry import Registry, functions_with
 
@@ -30,7 +30,7 @@ ORDERS = ("ndgrid", "meshgrid")
 # Readers, functions parse(raw, sign, order, sha256) -> Stored. Their attributes:
 #   suffix    of the files' names
 #   write     where results can be written: a function (path, result, **settings) of a
-#             result of `geomech.studies.fields`
+#             result of `geomech.studies.maps.fields`
 #   settings  the names of its settings, of "sign", "order" and "layout"
 #   joints    the only number of joints that it takes, if there is one
 #   whole     False where it takes A, its error and a quadratic metric alone

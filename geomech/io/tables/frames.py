@@ -2,7 +2,7 @@
 minimum-perturbation coordinates.
 
 In the frame whose pose in the first is h(alpha), xi_2 = Ad_h^-1 xi_1 + h^-1 dh/dt
-(`geomech.geometry.coordinates`). A and harmonics are exact at the grid's points. Of an
+(`geomech.mathematics.geometry.coordinates`). A and harmonics are exact at the grid's points. Of an
 rms residual, and of half widths of intervals, only the size of each component is known:
 they are multiplied by |Ad_h^-1|, which gives an upper bound.
 """
@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from geomech.geometry.connection import Connection, directions
-from geomech.geometry.coordinates import change_connection
-from geomech.geometry.harmonics import Harmonics, basis
-from geomech.geometry.minimum_perturbation import minimum_perturbation
-from geomech.geometry.tube import Tube
 from geomech.io.tables.base import MINIMUM_PERTURBATION, Stored, rms
+from geomech.mathematics.geometry.connection import Connection, directions
+from geomech.mathematics.geometry.coordinates import change_connection
+from geomech.mathematics.geometry.minimum_perturbation import minimum_perturbation
+from geomech.mathematics.geometry.representations.harmonics import Harmonics, basis
+from geomech.mathematics.geometry.representations.tube import Tube
 from rft.core.refusal import Refusal
 from rft.formulas import se2
 

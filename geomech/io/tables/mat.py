@@ -22,8 +22,6 @@ from typing import Any
 import numpy as np
 
 from geomech.core.variables import Result
-from geomech.geometry.connection import Connection
-from geomech.geometry.metric import Metric
 from geomech.io.files import atomic_file
 from geomech.io.tables import hdf5, matlab, sysplotter
 from geomech.io.tables.base import (
@@ -46,6 +44,8 @@ from geomech.io.tables.base import (
 )
 from geomech.io.tables.calc import write_struct
 from geomech.io.tables.netcdf import UNITS, shape_name
+from geomech.mathematics.geometry.connection import Connection
+from geomech.mathematics.geometry.metric import Metric
 from rft.core.refusal import Refusal
 
 ANGLES = ("alpha1", "alpha2")

@@ -13,10 +13,6 @@ from typing import Any
 import numpy as np
 
 from geomech.core.variables import Variable
-from geomech.geometry.connection import Connection
-from geomech.geometry.harmonics import Harmonics
-from geomech.geometry.metric import Finsler, Metric
-from geomech.geometry.tube import Loop, TaylorSeries, Tube
 from geomech.io.results import write_netcdf
 from geomech.io.tables.base import (
     FORMATS,
@@ -34,6 +30,10 @@ from geomech.io.tables.base import (
     is_real_number,
     rms,
 )
+from geomech.mathematics.geometry.connection import Connection
+from geomech.mathematics.geometry.metric import Finsler, Metric
+from geomech.mathematics.geometry.representations.harmonics import Harmonics
+from geomech.mathematics.geometry.representations.tube import Loop, TaylorSeries, Tube
 from rft.core.refusal import Refusal
 
 SOURCE = "write it anew with 'geomech connection SCENE -o FILE.nc'"
@@ -373,7 +373,7 @@ def _even_part(contents: _Contents) -> np.ndarray:
 
 
 def _taylor_series(contents: _Contents, factor: float) -> TaylorSeries:
-    """Return the Taylor series about a gait (`geomech.geometry.tube`), with A times
+    """Return the Taylor series about a gait (`geomech.mathematics.geometry.representations.tube`), with A times
     ``factor``."""
     for name, count in TAYLOR_VARIABLES.items():
         if name not in contents or contents.variables[name][1].ndim != count:

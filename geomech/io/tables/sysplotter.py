@@ -17,7 +17,7 @@ ProgramFiles/sys_calcsystem.m and its functions. There
 
 The derivatives in its CCF are differences of neighbours, of order 2, and one-sided at
 the edge. Its minimum-perturbation coordinates solve the same equations as
-`geomech.geometry.minimum_perturbation`, in linear elements.
+`geomech.mathematics.geometry.minimum_perturbation`, in linear elements.
 """
 
 from __future__ import annotations
@@ -28,11 +28,6 @@ from typing import Any
 
 import numpy as np
 
-from geomech.geometry.connection import Connection
-from geomech.geometry.curvature import ccf
-from geomech.geometry.field import Field
-from geomech.geometry.metric import Metric
-from geomech.geometry.minimum_perturbation import minimum_perturbation
 from geomech.io.tables.base import (
     MINIMUM_PERTURBATION,
     UNKNOWN_FRAME,
@@ -41,6 +36,11 @@ from geomech.io.tables.base import (
     checked_numbers,
     rms,
 )
+from geomech.mathematics.geometry.connection import Connection
+from geomech.mathematics.geometry.curvature import ccf
+from geomech.mathematics.geometry.metric import Metric
+from geomech.mathematics.geometry.minimum_perturbation import minimum_perturbation
+from geomech.mathematics.geometry.representations.field import Field
 from rft.core.refusal import Refusal
 
 CALC = "save it by sys_calcsystem, in a file whose name ends in _calc.mat"

@@ -1,0 +1,1 @@
+"""The geometry of locomotion: gaits, systems, connections and methods of prediction."""

@@ -1,0 +1,33 @@
+"""Gaits: closed curves in shape space, one file each."""
+
+from geomech.mathematics.gaits.centreline import Centreline
+from geomech.mathematics.gaits.fourier import Butterfly, Circle, Ellipse, Fourier
+from geomech.mathematics.gaits.points import Points
+from geomech.mathematics.gaits.polygon import Polygon
+from geomech.mathematics.gaits.shchf import Shchf
+from geomech.mathematics.gaits.waves import Sine, Wave
+from geomech.mathematics.geometry.gait import GAITS, Gait
+from rft.core.registry import load_all
+
+load_all(__name__, __path__)
+KINDS = GAITS
+
+__all__ = [
+    "GAITS",
+    "KINDS",
+    "Butterfly",
+    "Centreline",
+    "Circle",
+    "Ellipse",
+    "Fourier",
+    "Gait",
+    "Points",
+    "Polygon",
+    "Shchf",
+    "Sine",
+    "Wave",
+]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,0 +1,1 @@
+"""Functions of shape: on grids and planes, around a gait, by symmetry, over directions."""

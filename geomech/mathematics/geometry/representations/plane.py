@@ -1,0 +1,181 @@
+"""A plane of shape space: two joints move, the others are fixed.
+
+The CCF of the two is a component of the two-form there, for bodies with any number of
+joints. It takes no field of all joints, as its derivatives are along the plane."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NoReturn
+
+import numpy as np
+
+from geomech.core.work import Map, each
+from geomech.mathematics.geometry.connection import (
+    Connection,
+    Velocity,
+    as_axes,
+    directions,
+    least_squares,
+    sampled_on,
+)
+from geomech.mathematics.geometry.curvature import ccf, error
+from geomech.mathematics.geometry.gait import Gait
+from geomech.mathematics.geometry.representations.field import UNKNOWN_UNIT, Field
+from geomech.mathematics.geometry.representations.images import mirrored
+from geomech.mathematics.geometry.representations.tube import Tube
+from geomech.mathematics.geometry.traits import NOTHING, Traits
+from rft.core.checks import is_whole, real_array
+from rft.core.refusal import Refusal, formatted
+
+IN_PLANE = 1e-9  # rad: largest motion of the fixed joints of a gait in the plane
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """A plane of shape space.
+
+    pair: the joints that move, from 0, the first on the first axis. at: (d,), a shape
+    that it goes through, rad. connection: of these two joints, columns of the
+    least-squares A of all d."""
+
+    pair: tuple[int, int]
+    at: tuple[float, ...]
+    connection: Connection
+
+    @cached_property
+    def ccf(self) -> Field:
+        """CCF_ij, values (3, N, N)."""
+        return ccf(self.connection)
+
+    @cached_property
+    def error(self) -> Field:
+        """Estimated error of `ccf` (`curvature.error`), values (3, N, N)."""
+        return error(self.connection)
+
+    @property
+    def fixed(self) -> list[int]:
+        """The joints that do not move, from 0."""
+        return [k for k in range(len(self.at)) if k not in self.pair]
+
+
+@dataclass(frozen=True, eq=False)
+class ProjectedGait:
+    """A gait of many joints projected on a plane, along the joints that are fixed
+    there."""
+
+    gait: Gait
+    plane: Plane
+
+    def shape(self, t, amplitudes=None) -> np.ndarray:
+        """Return shapes (..., 2) on the plane, as `Gait.shape`."""
+        return self.gait.shape(t, amplitudes)[..., list(self.plane.pair)]
+
+    @property
+    def lies_in_plane(self) -> bool:
+        """Whether the gait moves on the plane itself."""
+        fixed = self.plane.fixed
+        shapes = self.gait.shape(np.linspace(0.0, 2 * np.pi, 64))
+        distance = shapes[..., fixed] - np.array(self.plane.at)[fixed]
+        return bool(np.abs(distance).max(initial=0.0) <= IN_PLANE)
+
+
+def checked_pair(pair: Sequence[int], joints: int) -> tuple[int, int]:
+    """Return pair as two different joints from 0; Refusal for any other, with numbers
+    from 1."""
+    are_joints = all(is_whole(k) and 0 <= k < joints for k in pair)
+    if len(pair) != 2 or not are_joints or pair[0] == pair[1]:
+        numbers = ", ".join(formatted(k + 1) for k in pair)
+        raise Refusal(f"a pair must be two of the joints 1 to {joints}, got {numbers}")
+    return int(pair[0]), int(pair[1])
+
+
+def plane_shapes(axes, pair: tuple[int, int], at: np.ndarray) -> np.ndarray:
+    """Return the shapes (N_i, N_j, d) of the plane of two joints, ``axes`` of each,
+    through the shape ``at`` (d,)."""
+    alpha = np.broadcast_to(at, (len(axes[0]), len(axes[1]), len(at))).copy()
+    alpha[..., list(pair)] = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
+    return alpha
+
+
+def plane(
+    velocity: Velocity,
+    axes,
+    pair: tuple[int, int],
+    at,
+    count: int,
+    degree: int = 3,
+    progress: Callable | None = None,
+    *,
+    traits: Traits = NOTHING,
+    unit: str = UNKNOWN_UNIT,
+    length: float | None = None,
+    map: Map = each,
+) -> Plane:
+    """Return the plane of two joints, ``axes`` of each, through the shape ``at`` (d,).
+
+    Other arguments are those of `connection.fit`. A is the same: fitted over all
+    directions of alphadot, not only those of the two joints."""
+    at = real_array("at", at)
+    axes = as_axes(axes)
+    if at.ndim != 1 or not np.isfinite(at).all():
+        raise Refusal("at must be one finite shape", value=at.tolist())
+    pair = checked_pair(pair, len(at))
+    alpha = plane_shapes(axes, pair, at)
+    rates = directions(len(at), count)
+    symmetries = []
+    if traits.halved:
+        symmetries = mirrored(alpha.reshape(-1, len(at)), count)
+    A, residual, speed = sampled_on(
+        velocity,
+        alpha,
+        rates,
+        least_squares(rates),
+        progress,
+        symmetries,
+        traits.singularity,
+        map,
+    )
+    fitted = Connection(
+        axes, A[:, list(pair)], residual, speed, degree, unit=unit, length=length
+    )
+    return Plane(pair, tuple(at.tolist()), fitted)
+
+
+def interpolated_plane(fitted: Connection, pair: tuple[int, int], at) -> Plane:
+    """Return the plane in a field of all joints, on its axes, interpolated between its
+    points; near a measured gait nan where the data do not reach.
+
+    Refusal off the field, or for a plane that the data do not reach at all."""
+    at = fitted.field.inside(real_array("at", at))
+    pair = checked_pair(pair, len(fitted.axes))
+    axes = tuple(fitted.axes[k] for k in pair)
+    alpha = plane_shapes(axes, pair, at)
+    if isinstance(fitted, Tube):
+        A = fitted.taylor.connection_within_reach(alpha)
+        if np.isnan(A).all():
+            _refuse_unreached(fitted, pair, at)
+    else:
+        A = fitted(alpha)
+    A = np.moveaxis(A, (-2, -1), (0, 1))[:, list(pair)]
+
+    # Files of other programs do not have the residual of their fit.
+    residual = np.full((3, *alpha.shape[:-1]), np.nan)
+    speed = residual
+    if np.isfinite(fitted.residual).all():
+        residual = np.moveaxis(Field(fitted.axes, fitted.residual, 1)(alpha), -1, 0)
+        speed = np.moveaxis(Field(fitted.axes, fitted.speed, 1)(alpha), -1, 0)
+    connection = Connection(axes, A, residual, speed, fitted.degree, **fitted.size)
+    return Plane(pair, tuple(at.tolist()), connection)
+
+
+def _refuse_unreached(tube: Tube, pair: tuple[int, int], at: np.ndarray) -> NoReturn:
+    """Refuse a plane that the data of a measured gait do not reach."""
+    fixed = [f"alpha_{k + 1} = {x:.3g}" for k, x in enumerate(at) if k not in pair]
+    start = ",".join(f"{x:.3f}" for x in tube.taylor.loop.shape(np.array(0.0)))
+    raise Refusal(
+        f"the data do not reach the plane of {', '.join(fixed)}",
+        instead=f"slice it at a shape of the mean gait, ``at`` {start}",
+    )

@@ -1,0 +1,47 @@
+"""Systems, one in each file: objects with a velocity(alpha, alphadot) and their
+traits."""
+
+from geomech.mathematics.geometry.traits import Traits
+from geomech.mathematics.systems.base import (
+    SYSTEMS,
+    Cycle,
+    System,
+    as_system,
+    integrated,
+)
+from geomech.mathematics.systems.capabilities import capability
+from geomech.mathematics.systems.diff_drive import DifferentialDrive
+from geomech.mathematics.systems.floating import FloatingChain
+from geomech.mathematics.systems.ideal_fluid import IdealFluidSwimmer
+from geomech.mathematics.systems.no_slip import NoSlipSnake
+from geomech.mathematics.systems.solver import Solver
+from geomech.mathematics.systems.swimmer import Swimmer
+from geomech.mathematics.systems.table import Table
+from rft.core.premise import Premise
+from rft.core.registry import load_all
+
+load_all(__name__, __path__)
+KINDS = SYSTEMS
+
+__all__ = [
+    "KINDS",
+    "SYSTEMS",
+    "Cycle",
+    "DifferentialDrive",
+    "FloatingChain",
+    "IdealFluidSwimmer",
+    "NoSlipSnake",
+    "Premise",
+    "Solver",
+    "Swimmer",
+    "System",
+    "Table",
+    "Traits",
+    "as_system",
+    "capability",
+    "integrated",
+]
+
+
+def __dir__() -> list[str]:
+    return __all__

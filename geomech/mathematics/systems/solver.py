@@ -1,0 +1,87 @@
+"""How the balance of forces of a swimmer is solved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from rft.balance.backend import check, installed
+from rft.bodies.pieces import PIECES
+from rft.core.checks import Number, check_numbers
+from rft.effects.contact import MOST_PIECES
+from rft.formulas.quadrature import parse
+
+
+@dataclass(frozen=True)
+class Solver:
+    """How the balance of forces is solved; part of [numerics].
+
+    loads (-): "exact", "midpoint:N", "gauss:N" (rft.formulas.quadrature). backend (-): "numpy",
+    "numba" (compiled code, where numba is installed) or "auto": compiled code where
+    numba is installed (`rft.balance.backend`). Answers are the same but for rounding.
+
+    Examples
+    --------
+    >>> from geomech.mathematics.systems import Solver, Swimmer
+    >>> from rft import Chain, Viscous
+    >>> swimmer = Swimmer(Viscous(), Chain(), solver=Solver(loads="gauss:24"))
+    >>> swimmer.velocity([0.5, 0.3], [1.0, 0.0]).round(4)
+    array([-0.0014, -0.0035, -0.0817])
+    """
+
+    loads: str = "exact"
+    regularisation: Annotated[
+        float,
+        Number(
+            1e-12,
+            1,
+            "body lengths per rad",
+            "speed below which dry friction is rounded off (rft.balance)",
+        ),
+    ] = 1e-6
+    tolerance: Annotated[float, Number(1e-13, 1, "-", "normalised residual")] = 1e-10
+    cycles: Annotated[
+        int | None,
+        Number(
+            1,
+            10_000,
+            "-",
+            "cycles of time stepping (rft.time_steps); if left out until they are "
+            "periodic, one where effects break symmetry",
+            whole=True,
+        ),
+    ] = None
+    pieces: Annotated[
+        int,
+        Number(
+            1,
+            MOST_PIECES,
+            "-",
+            "pieces to a body length, 1 to 10,000, into which effects that vary along "
+            "an element cut it (rft.effects)",
+            whole=True,
+        ),
+    ] = PIECES
+    backend: str = "auto"
+
+    def __post_init__(self):
+        parse(self.loads)
+        check(self.backend)
+        check_numbers(self)
+
+    def computed(self, compilable: bool, law: str) -> str:
+        """Return the back end in words, and why it is not compiled code.
+
+        compilable: whether compiled code has the law of that name."""
+        if self.backend == "numpy":
+            return "NumPy, as asked for"
+        if not compilable:
+            return (
+                f"NumPy: compiled code does not know the law {law}, whose traction is"
+                " no formula"
+            )
+        if not installed():
+            return "NumPy: numba is not installed (pip install 'geomech[fast]')"
+        if self.backend == "numba":
+            return "compiled code"
+        return "compiled code; commands take NumPy where there is little to compute"

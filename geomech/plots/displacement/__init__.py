@@ -1,0 +1,1 @@
+"""Figures of displacements: against amplitude, parameters and cost."""

@@ -1,0 +1,259 @@
+"""Sweeps over a scene's parameters, in pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from geomech.core.variables import Result
+from geomech.plots.displacement.displacements import medium_band
+from geomech.plots.style import MARKED, figure, quantity, styled
+from geomech.scenes.model import Scene
+from geomech.studies.displacement.cycles import AMPLITUDE
+from geomech.studies.tables import position_spread
+from rft.core.refusal import Refusal
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Units of parameters by the last part of their names; other parameters have none.
+PARAMETER_UNITS = {
+    "gamma0": "rad",
+    "length": "m",
+    "frequency": "Hz",
+    "mass": "kg",
+    "drag": "N",
+    "depth": "m",
+    "radius": "BL",
+    "distance": "BL",
+    "travel": "BL",
+    "slope": "1/BL",
+    "towards": "rad",
+    "tilt": "rad",
+    "period": "s",
+    "extent": "rad",
+    "regularisation": "BL/rad",
+}
+
+ROBOT_UNITS = {  # likewise, in scenes of robots
+    "mass": "kg",
+    "inertia": "kg m$^2$",
+    "length": "m",
+    "width": "m",
+    "height": "m",
+    "hip_height": "m",
+    "radius": "m",
+    "lug_height": "m",
+    "lug_width": "m",
+    "axle": "m",
+    "frequency": "Hz",
+    "sweep": "rad",
+    "middle": "rad",
+    "air_speed": "m/s",
+    "fluidisation": "m/s",
+    "grazing": "rad",
+    "duration": "s",
+    "rounding": "m/s",
+    "core": "m",
+    "pitch": "m",
+    "thickness": "m",
+    "nose": "m",
+    "track": "m",
+    "drop": "m",
+    "xi_n": "N/m$^3$",
+    "density": "kg/m$^3$",
+}
+
+
+def sweep_figure(scene: Any, result: Result) -> Figure:
+    """Draw a sweep over one parameter or two: net distance or speed, or the speed of a
+    robot; refuse more parameters.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> swept = geomech.sweep("three-link-viscous", {"medium.ratio": [1.5, 2.0]})
+    >>> fig = geomech.plots.sweep_figure(swept.question.scene, swept)
+    """
+    count = len(parameters(result))
+    if count > 2:
+        raise Refusal(
+            f"cannot draw {count} parameters",
+            instead="sweep one or two, or leave ``plot`` out",
+        )
+    if "status" in result:
+        return _speed_figure(scene, result)
+    return _net_figure(scene, result)
+
+
+def parameters(result: Result) -> dict[str, np.ndarray]:
+    """Return the values of the parameters of a sweep, by their names in a scene."""
+    return {v.label: v.values for v in result.variables if v.is_coordinate}
+
+
+# Swimmers
+
+
+def _net_figure(scene: Scene, result: Result) -> Figure:
+    """Draw `net_values` against one parameter, or a map over two."""
+    over = parameters(result)
+    values, error, spread, label = net_values(result)
+    fig, axes = figure(4.0, 3.0)
+    ax = axes[0, 0]
+    order = np.ix_(*(np.argsort(x, kind="stable") for x in over.values()))
+    rising = [np.sort(x) for x in over.values()]
+    names = axis_labels(scene, list(over))
+    ax.set_xlabel(names[0])
+    if len(over) == 1:
+        if spread is not None:
+            spread = spread[order]
+        _draw_line(ax, *rising, values[order], error[order], spread)
+        ax.set_ylabel(label)
+    else:
+        _draw_map(ax, *rising, values[order], label)
+        ax.set_ylabel(names[1])
+    return fig
+
+
+def net_values(result: Result):
+    """Return (values, their errors, their spread by the medium or None, label) to draw.
+
+    Values are the net distance per cycle, negative where it is backwards; where the
+    frequency differs from point to point, the speed."""
+    net = result["net_distance"]
+    distance = np.copysign(net.values, result["x"].values)
+    factor: Any = 1.0
+    label = f"net distance per cycle ({net.unit})"
+    if "frequency" in result and np.ptp(result["frequency"].values) > 0:
+        factor = result["frequency"].values
+        label = f"speed ({net.unit}/s)"
+    spread = None
+    if net.spread is not None:
+        spread = position_spread(result) * factor
+    distance = distance * factor
+    if (distance < 0).any():
+        label += ", backwards < 0"
+    return distance, net.error * factor, spread, label
+
+
+@styled
+def _draw_line(
+    ax: Axes,
+    x: np.ndarray,
+    values: np.ndarray,
+    errors: np.ndarray,
+    spread: np.ndarray | None,
+) -> None:
+    """Draw values (B,) over x with their errors and the band of an uncertain medium."""
+    marker = "o" if len(x) <= MARKED else ""
+    ax.errorbar(
+        x,
+        values,
+        yerr=errors,
+        fmt=f"{marker}-",
+        color="black",
+        ms=3,
+        lw=1,
+        label="with estimated error",
+    )
+    if spread is not None:
+        medium_band(ax, x, values, spread)
+        ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0))
+
+
+@styled
+def _draw_map(
+    ax: Axes, x: np.ndarray, y: np.ndarray, values: np.ndarray, label: str
+) -> None:
+    """Draw values (N, M) as cells about the points of x (N,) and y (M,).
+
+    Colours are centred on zero where the sign changes; the axes end at the outermost
+    points."""
+    from cmcrameri import cm
+
+    top = np.abs(values).max() or 1.0
+    look: dict[str, Any] = {"cmap": "viridis"}
+    if values.min() < 0 < values.max():
+        look = {"cmap": cm.vik, "vmin": -top, "vmax": top}
+    image = ax.pcolormesh(x, y, values.T, shading="nearest", rasterized=True, **look)
+    if x[0] < x[-1]:
+        ax.set_xlim(x[0], x[-1])
+    if y[0] < y[-1]:
+        ax.set_ylim(y[0], y[-1])
+    ax.figure.colorbar(image, ax=ax).set_label(label)
+
+
+def axis_labels(
+    scene: Any, parameters: list[str], units: Mapping[str, str] = PARAMETER_UNITS
+) -> list[str]:
+    """Return a label with unit for each parameter: the last part of its name, or such
+    as "body-inertia: frequency (Hz)" where several have the same last part."""
+    last_parts = [name.rpartition(".")[2] for name in parameters]
+    labels = []
+    for name, last in zip(parameters, last_parts):
+        if name == AMPLITUDE:
+            labels.append(scene.gait.amplitude_label)
+            continue
+        text = last
+        if last_parts.count(last) > 1:
+            owner = name.split(".")[-2].replace("_", "-")
+            text = f"{owner}: {last}"
+        unit = units.get(last, "-")
+        if last.endswith("_deg"):
+            unit = "deg"
+            text = text.removesuffix("_deg")
+        labels.append(quantity(text.replace("gamma0", "gamma_0"), unit))
+    return labels
+
+
+# Robots
+
+
+@styled
+def _speed_figure(scene: Any, result: Result) -> Figure:
+    """Draw speed against the first parameter, with a curve for each value of a
+    second."""
+    over = parameters(result)
+    labels = axis_labels(scene, list(over), ROBOT_UNITS)
+    values = list(over.values())
+    names = [""]
+    if len(over) == 2:
+        names = [f"{labels[1]}: {value:g}" for value in values[1]]
+    fig, axes = figure(4.6, 3.2)
+    ax = axes[0, 0]
+    curves(ax, values[0], result, names)
+    ax.set(xlabel=labels[0], ylabel="mean speed (m/s)")
+    return fig
+
+
+def curves(ax: Axes, values: Any, result: Result, names: Any) -> None:
+    """Draw speed with its error over the values (N,) of a parameter, with a curve for
+    each name; markers are open where the robot does not walk.
+
+    result: of a sweep, with ``speed`` and ``status`` (N, ...)."""
+    from cmcrameri import cm
+
+    rows = len(values)
+    speed = result["speed"].values.reshape(rows, -1)
+    error = result["speed"].error.reshape(rows, -1)
+    status = result["status"].values.reshape(rows, -1)
+    for k, label in enumerate(names):
+        colour = cm.batlow(0.85 * k / max(1, len(names) - 1))
+        ax.errorbar(
+            values,
+            speed[:, k],
+            yerr=error[:, k],
+            color=colour,
+            lw=1.0,
+            capsize=2,
+            label=label,
+        )
+        walks = status[:, k] == "walking"
+        for fill, mask in ((colour, walks), ("white", ~walks)):
+            x = np.array(values)[mask]
+            ax.plot(x, speed[mask, k], "o", ms=4, color=colour, mfc=fill)
+    if any(names):
+        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))

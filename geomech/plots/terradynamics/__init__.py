@@ -1,0 +1,1 @@
+"""Figures of intruders, plates, robots and beds of grains."""

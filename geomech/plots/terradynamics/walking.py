@@ -1,0 +1,191 @@
+"""The walk of a robot: its motion in time, and the robot from the side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from geomech.core.variables import Result
+from geomech.plots.style import figure, styled
+from geomech.results.scenes import scene_of
+from geomech.studies.terradynamics import walking
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+TRIPOD_COLOURS = ("0.2", "C0")  # of the legs that move in step
+STRIP_PICTURES = 6
+FOLLOWED_SPAN = 2.4  # in half widths of a robot, to either side of one that is followed
+
+
+@styled
+def walk_figure(result: Result) -> Figure:
+    """Draw forward speed, height and pitch in time, and the robot at its end."""
+    t = result["t"].values
+    fig, axes = figure(7.2, 4.6, 2, 2)
+    lines = (
+        ("forward speed (m/s)", result["v_x"].values),
+        (r"height $z$ (m)", result["z"].values),
+        ("pitch (degrees)", np.degrees(result["pitch"].values)),
+    )
+    for ax, (label, values) in zip(axes.ravel(), lines):
+        ax.plot(t, values, color="black", lw=0.8)
+        end = t[-1] or scene_of(result).numerics.duration
+        ax.set(xlabel="$t$ (s)", ylabel=label, xlim=(0, end))
+    speed = float(result["speed"])
+    axes[0, 0].axhline(speed, color="C3", lw=1.0, ls="--")
+    status = str(result["status"].values)
+    axes[0, 0].set_title(f"mean {speed:.3g} m/s, {status}", color="C3")
+    last = len(t) - 1
+    walk_stage(axes[1, 1], result, np.array([last]))(last)
+    return fig
+
+
+@styled
+def walk_strip(result: Result) -> Figure:
+    """Draw the last cycle of a walk in pictures from the side."""
+    t = result["t"].values
+    begin = max(0.0, t[-1] - 1 / float(result["frequency"]))
+    rows = rows_at(t, np.linspace(begin, t[-1], STRIP_PICTURES))
+    fig, axes = figure(2.3 * 3, 1.9 * 2, 3, 2, layout="compressed")
+    for ax, row in zip(axes.ravel(), rows):
+        walk_stage(ax, result, np.array([row]))(row)
+        ax.label_outer(remove_inner_ticks=False)
+        ax.tick_params(labelbottom=True)
+    return fig
+
+
+def rows_at(t: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return the rows of a walk whose times t (N,) are the first not before
+    ``times``."""
+    return np.searchsorted(t, times - 1e-9).clip(0, len(t) - 1)
+
+
+def walk_stage(
+    ax: Axes, result: Result, rows: np.ndarray, follow: bool = False
+) -> Callable[[int], None]:
+    """Draw the ground on axes that hold the robot at these rows of its walk; return a
+    function that draws the robot at one of them.
+
+    follow: the axes move with the robot."""
+    robot: FlatRobot | SolidRobot
+    if "states" in result:
+        robot = SolidRobot(result)
+    else:
+        robot = FlatRobot(result)
+    reach = robot.leg_reach
+    t = result["t"].values
+    x = result["x"].values
+    shown_x = x[rows]
+    margin = 1.1 * robot.half_width
+    if follow:
+        shown_x = shown_x[:1]
+        margin = FOLLOWED_SPAN * robot.half_width
+    ax.axhspan(-3 * reach, 0.0, color="peru", alpha=0.35, lw=0)
+    ax.set(
+        xlim=(shown_x.min() - margin, shown_x.max() + margin),
+        ylim=(-1.2 * reach, 3.2 * reach),
+        aspect="equal",
+        xlabel="$x$ (m)",
+        ylabel="$z$ (m)",
+    )
+    draw_robot = robot.artist(ax)
+    title = ax.set_title("", loc="left", fontsize=8)
+
+    def update(row: int) -> None:
+        draw_robot(row)
+        title.set_text(f"t = {t[row]:.2f} s")
+        if follow:
+            ax.set_xlim(x[row] - margin, x[row] + margin)
+
+    return update
+
+
+class FlatRobot:
+    """The outlines of a robot in the vertical plane over its walk.
+
+    half_width: distance from its origin to its farthest point along x, m. leg_reach:
+    size of a leg, m."""
+
+    def __init__(self, result: Result):
+        scene = scene_of(result)
+        robot = scene.robot
+        self.robot = robot
+        self.gait = scene.gait
+        self.t = result["t"].values
+        self.pose = np.stack([result[name].values for name in ("x", "z", "pitch")], -1)
+        self.leg = robot.leg(40).points
+        self.belly = robot.belly(8)
+        self.leg_reach = np.abs(self.leg).max()
+        self.hips = [(x, robot.hip_height) for x in robot.hips]
+        leg_ends = [abs(x) + self.leg_reach for x in robot.hips]
+        half_length = getattr(robot, "length", 0.0) / 2
+        self.half_width = max(self.leg_reach, half_length, *leg_ends)
+
+    def artist(self, ax: Axes) -> Callable[[int], None]:
+        """Return a function that draws the robot at a row of its walk."""
+        phases = self.robot.hip_phases
+        legs = [(hip, phase) for hip in range(len(self.hips)) for phase in phases]
+        lines = []
+        for hip, phase in legs:
+            colour = TRIPOD_COLOURS[int((hip + 2 * phase) % 2)]
+            lines += ax.plot([], [], color=colour, lw=1.2)
+        (box,) = ax.plot([], [], color="black", lw=1.2)
+
+        def draw(row: int) -> None:
+            place = self.pose[row, :2]
+            pitch = self.pose[row, 2]
+            for line, (hip, phase) in zip(lines, legs):
+                offset = (hip * phases[-1] + phase) % 1.0
+                turns = self.gait.frequency * self.t[row] + offset
+                centre = rotated(np.array([self.hips[hip]]), pitch) + place
+                angle = pitch + float(self.gait.angle(turns, turns))
+                line.set_data(*(rotated(self.leg, angle) + centre).T)
+            if self.belly is not None:
+                box.set_data(*(rotated(self.belly.points, pitch) + place).T)
+
+        return draw
+
+
+class SolidRobot:
+    """The triangles of a robot in three dimensions over its walk, seen from its right.
+
+    half_width, leg_reach: as for `FlatRobot`."""
+
+    def __init__(self, result: Result):
+        self.view = walking.view(scene_of(result))
+        self.states = result["states"].values
+        first = self.view.triangles(self.states[0]).reshape(-1, 3)
+        start = [float(result["x"].values[0]), 0.0]
+        self.half_width = float(np.abs(first[:, [0, 1]] - start).max())
+        self.leg_reach = max(float(np.ptp(first[:, 2])), self.half_width / 4) / 2
+
+    def artist(self, ax: Axes) -> Callable[[int], None]:
+        """Return a function that draws the robot at a row of its walk."""
+        from matplotlib.collections import PolyCollection
+        from matplotlib.colors import to_rgba
+
+        group_colours = np.array([to_rgba(c) for c in ("0.75", *TRIPOD_COLOURS)])
+        colours = group_colours[self.view.groups]
+        # Lines show sheets that are seen edge-on.
+        polygons = ax.add_collection(PolyCollection([], lw=1.0))
+
+        def draw(row: int) -> None:
+            triangles = self.view.triangles(self.states[row])
+            # Farther triangles are drawn first.
+            order = np.argsort(-triangles[..., 1].mean(1), kind="stable")
+            polygons.set_verts(triangles[order][..., [0, 2]])
+            polygons.set_facecolor(colours[order])
+            polygons.set_edgecolor(colours[order])
+
+        return draw
+
+
+def rotated(points: np.ndarray, angle: float) -> np.ndarray:
+    """Return points (N, 2) of x and z after a rotation of x towards -z, rad."""
+    c = np.cos(angle)
+    s = np.sin(angle)
+    return points @ np.array([[c, -s], [s, c]])

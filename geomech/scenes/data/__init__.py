@@ -1,0 +1,1 @@
+"""Measured data that scenes name."""

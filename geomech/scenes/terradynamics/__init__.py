@@ -1,0 +1,1 @@
+"""Scenes of intruders and robots in granular ground."""

@@ -1,0 +1,1 @@
+"""The command line, and how values appear in terminals and notebooks."""

@@ -1,0 +1,1 @@
+"""Displacements per cycle: by tiers, amplitudes and sweeps of parameters."""

@@ -1,0 +1,1 @@
+"""Errors and costs of predictions, estimated before and after they are computed."""

@@ -1,0 +1,1 @@
+"""Beds of grains: drag on rods, and swimmers."""

@@ -1,0 +1,1 @@
+"""Maps over shape space: connections, CCFs and metrics."""

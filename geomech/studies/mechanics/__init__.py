@@ -1,0 +1,1 @@
+"""Velocities, motions and forces of one swimmer."""

@@ -1,0 +1,1 @@
+"""The ascent to an optimum: objectives, constraints and steps."""

@@ -1,0 +1,1 @@
+"""Intruders and robots in the vertical plane, and media fitted to measured drag."""
