@@ -50,6 +50,7 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech.api import velocity as velocity
     from geomech.api import walk as walk
     from geomech.mathematics import gaits as gaits
+    from geomech.mathematics import symbolic as symbolic
     from geomech.mathematics import systems as systems
     from geomech.mathematics import tiers as tiers
     from geomech.mathematics.geometry import connection as connection
@@ -83,7 +84,10 @@ _MODULES = {  # by their names here; none is imported before its first use
         name: f"geomech.mathematics.geometry.{name}"
         for name in ("connection", "curvature", "reconstruct")
     },
-    **{name: f"geomech.mathematics.{name}" for name in ("gaits", "systems", "tiers")},
+    **{
+        name: f"geomech.mathematics.{name}"
+        for name in ("gaits", "symbolic", "systems", "tiers")
+    },
     "measured": "geomech.studies.measured",
     "plots": "geomech.plots",
     **{name: f"rft.{name}" for name in ("bodies", "effects")},

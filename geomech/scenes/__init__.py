@@ -56,7 +56,9 @@ def __getattr__(name: str) -> type:
     # is imported when first used.
     if name not in _MODULES:
         raise AttributeError(f"module 'geomech.scenes' has no attribute {name!r}")
-    kind = getattr(import_module(f"geomech.scenes.{_MODULES[name]}"), name)
+    kind = getattr(
+        import_module(f"geomech.scenes.terradynamics.{_MODULES[name]}"), name
+    )
     globals()[name] = kind
     return kind
 

@@ -21,7 +21,10 @@ from geomech.run.cost import Cost
 from geomech.run.runner import runner
 from geomech.studies.settings import Measurements, measurement_variables, padded_array
 
-KINDS = {"robot": "walking", "intruder": "intrusion"}  # loaded only where needed
+KINDS = {
+    "robot": "terradynamics.walking",
+    "intruder": "terradynamics.intrusion",
+}  # loaded only where needed
 DIGITS = 3  # of seconds: a second run differs in the second
 
 
@@ -67,7 +70,7 @@ class AccuracySubject(Protocol):
 def accuracy_subject(scene: Any, runs: int | None = None) -> AccuracySubject:
     """Return the subject of an accuracy study of a scene: a displacement, forces along a
     motion, or the speed of a robot."""
-    module = "tiered"
+    module = "displacement.tiered"
     for part, name in KINDS.items():
         if hasattr(scene, part):
             module = name

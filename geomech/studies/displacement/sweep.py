@@ -47,7 +47,9 @@ class BatchedQuestion(Protocol):
 def batched_question(scene: Any) -> BatchedQuestion:
     """Return the question of sweeps over a scene: the displacement of a gait, or the speed of a robot."""
     kind, module = (
-        ("Walks", "walking") if hasattr(scene, "robot") else ("Cycles", "cycles")
+        ("Walks", "terradynamics.walking")
+        if hasattr(scene, "robot")
+        else ("Cycles", "displacement.cycles")
     )
     return getattr(
         import_module(f"geomech.studies.{module}"), kind
