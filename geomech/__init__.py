@@ -14,6 +14,7 @@ load, Scene, Swimmer, Numerics, toml    scenes: read, built and written
 medium                                  a medium of the vertical plane, by name or from a file
 media, bodies, gaits, effects, systems  the parts of scenes; `register` adds custom ones
 connection, curvature, reconstruct      the geometry of any velocity(alpha, alphadot)
+symbolic                                formulas of connections and CCFs
 fit_medium, fit_gait, fitted_gait       media and gaits fitted to measurements
 measured, fit_log                       logs and midlines, stage by stage
 plots, undulation                       figures; swimmers that undulate

@@ -250,7 +250,7 @@ def test_pieces_change_no_numbers(monkeypatch):
     for module in (
         connection,
         *(
-            sys.modules[f"geomech.{name}"]
+            sys.modules[f"geomech.mathematics.{name}"]
             for name in ("tiers.area", "tiers.direct", "geometry.family")
         ),
     ):

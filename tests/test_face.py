@@ -239,9 +239,9 @@ def test_packages_list_their_public_names():
                     assert all(hasattr(package, name) for name in package.__all__), (
                         module.name
                     )
-    assert {"sweep", "accuracy", "motion"} <= set(dir(geomech.studies)) and not hasattr(
-        geomech.studies, "sweeps"
-    )
+    assert {"displacement", "grid", "report"} <= set(
+        dir(geomech.studies)
+    ) and not hasattr(geomech.studies, "sweeps")
     assert {"Chain", "laws", "terradynamics"} <= set(
         dir(rft)
     ) and "importlib" not in dir(rft)

@@ -546,7 +546,7 @@ def interrupt(*batch):
     raise KeyboardInterrupt
 
 kinds.register(drift, joints=2)
-cycles.SAMPLES_TOGETHER = 1
+cycles.BATCH_SIZE = 1
 if sys.argv[1:]:
     rows, cycles._rows = cycles._rows, interrupted
 found = sweep.sweep(Scene(SYSTEMS["drift"](), Circle()), {"gait.amplitude": [0.5, 1.0]}, ".kept")

@@ -20,6 +20,7 @@ from geomech.mathematics.geometry.connection import Connection
 from geomech.mathematics.geometry.representations.field import Field
 from geomech.mathematics.systems.base import shape_labels
 from geomech.mathematics.tiers import TIERS
+from geomech.plots.displacement import sweeps
 from geomech.plots.displacement.displacements import (
     ERROR,
     MEASURED,
@@ -574,9 +575,9 @@ def test_parameters_have_names_and_units():
         "radius (BL)",
         scene.gait.amplitude_label,
     ]
-    assert plots.sweeps.axis_labels(scene, names) == named
+    assert sweeps.axis_labels(scene, names) == named
     both = ["effects.end-caps.radius", "effects.disturbed-ground.radius"]
-    assert plots.sweeps.axis_labels(scene, both) == [
+    assert sweeps.axis_labels(scene, both) == [
         "end-caps: radius (BL)",
         "disturbed-ground: radius (BL)",
     ]

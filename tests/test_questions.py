@@ -289,7 +289,7 @@ def test_help_loads_nothing_that_computes_or_draws():
     """Of any command; the list of all commands loads no NumPy either."""
     heavy = {"scipy", "matplotlib", "geomech.scenes", "geomech.mathematics.systems"}
     code = (
-        "import sys\nfrom geomech import cli\n"
+        "import sys\nfrom geomech.shell import cli\n"
         "listed = 'numpy' in sys.modules\n"
         "for name in cli.Commands():\n    cli.Commands()[name]\n"
         f"sys.exit(listed or bool({heavy} & {{*sys.modules}}))"

@@ -517,7 +517,7 @@ COMMANDS = {
 def small(tmp_path, monkeypatch, fine, step_by_step):
     """Small scenes whose requests are made of many tasks."""
     monkeypatch.setattr(walking, "PILOT", 0.0)
-    monkeypatch.setattr(walking, "TOGETHER", 2)
+    monkeypatch.setattr(walking, "BATCH", 2)
     monkeypatch.setattr(type(scenes.load("c-leg")), "ladder", (4, 8, 16, 32))
     for file, content in SMALL.items():
         (tmp_path / file).write_text(content)

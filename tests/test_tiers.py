@@ -495,7 +495,7 @@ def test_a_table_pays_for_many_amplitudes_and_not_for_few():
 )
 def test_the_position_decides_and_not_the_heading(error, tier, monkeypatch):
     monkeypatch.setattr(
-        "geomech.studies.displacement.choose.against_direct",
+        "geomech.studies.displacement.choose.errors_from_direct",
         lambda *_: np.tile(error, (400, 1)),
     )
     assert (

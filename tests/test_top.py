@@ -100,7 +100,10 @@ def test_nothing_heavy_is_loaded_to_start():
     """Neither by `import geomech` and `dir` nor by `geomech --help`; NumPy alone takes longer than both."""
     heavy = "{'numpy', 'scipy', 'matplotlib', 'sympy', 'msgspec', 'rft.laws'} & set(sys.modules)"
     assert python(f"import sys, geomech; dir(geomech); print({heavy})") == "set()\n"
-    assert python(f"import sys; from geomech import cli; print({heavy})") == "set()\n"
+    assert (
+        python(f"import sys; from geomech.shell import cli; print({heavy})")
+        == "set()\n"
+    )
 
 
 def test_the_version_is_told_once_and_the_same_everywhere():

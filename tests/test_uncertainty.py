@@ -13,6 +13,7 @@ from geomech.io.results import from_dict
 from geomech.mathematics.gaits import Butterfly, Ellipse
 from geomech.mathematics.systems import Swimmer, capability
 from geomech.mathematics.systems.capabilities import Uncertain
+from geomech.plots.displacement import sweeps
 from geomech.scenes import Scene
 from geomech.studies.displacement import sweep
 from geomech.studies.displacement.choose import cheapest_displacements
@@ -358,7 +359,7 @@ def test_sweeps_have_it(tmp_path):
     result = sweep.sweep(sand, {"gait.frequency": [1.0, 3.0]})
     one = swept_table(result)
     (_, band) = plots.sweep_figure(sand, result).axes[0].collections
-    net, _, medium, _ = plots.sweeps.net_values(result)
+    net, _, medium, _ = sweeps.net_values(result)
     np.testing.assert_allclose(medium, one["frequency"] * one["medium_error"])
     box = band.get_datalim(band.axes.transData)
     assert (box.y0, box.y1) == (

@@ -177,7 +177,7 @@ def loop_area(
     return area, np.abs(area - np.pi * np.stack(fewer)).max(0)
 
 
-GAITS = Registry("geomech.mathematics.gaits", "kind", "a gait", subclasses(Gait))
+GAITS = Registry("geomech.gaits", "kind", "a gait", subclasses(Gait))
 
 
 def finite_array(name: str, values: Sequence, ndim: int) -> np.ndarray:

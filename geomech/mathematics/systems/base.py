@@ -262,9 +262,7 @@ def note_angles(system: System, largest: float) -> None:
         check_angle("a joint angle", largest)
 
 
-SYSTEMS = Registry(
-    "geomech.mathematics.systems", "kind", "a system", classes_with("velocity")
-)
+SYSTEMS = Registry("geomech.systems", "kind", "a system", classes_with("velocity"))
 
 
 def length_unit(system: System) -> str:

@@ -220,9 +220,7 @@ class Tier:
 
 
 # In the order of the cost of an interpolation, cheapest first.
-TIERS = Registry(
-    "geomech.mathematics.tiers", "name", "a tier", lambda part: isinstance(part, Tier)
-)
+TIERS = Registry("geomech.tiers", "name", "a tier", lambda part: isinstance(part, Tier))
 
 
 def solved_phases(system: System, gait: Gait, phases: int) -> int:
