@@ -1,11 +1,13 @@
-"""Environments of Gymnasium in which robots learn to walk in sand. Importing this module registers them. Needs the extra
-`gym`.
+"""Environments of Gymnasium in which robots learn to walk in sand. Importing this
+module registers them. Needs the extra `gym`.
 
     import gymnasium
     import geomech.gym
 
     env = gymnasium.make("geomech/HexapodSand-v0")
-    many = gymnasium.make_vec("geomech/HexapodSand-v0", num_envs=64, vectorization_mode="vector_entry_point")
+    many = gymnasium.make_vec(
+        "geomech/HexapodSand-v0", num_envs=64, vectorization_mode="vector_entry_point"
+    )
 """
 
 from __future__ import annotations
@@ -21,9 +23,8 @@ if TYPE_CHECKING:
 
 __all__ = ["HexapodSand", "HexapodSands"]
 
-with contextlib.suppress(
-    ModuleNotFoundError
-):  # what is missing is told at the first use
+# Missing packages are named at the first use.
+with contextlib.suppress(ModuleNotFoundError):
     from gymnasium.envs.registration import register
 
     register(

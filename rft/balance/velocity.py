@@ -17,7 +17,7 @@ from rft.core.checks import in_range, real_array
 from rft.core.premise import negation
 from rft.core.refusal import Refusal, require
 from rft.effects.base import Effect, broken_premises, engine
-from rft.effects.contact import assemble
+from rft.effects.contact import Assembly, Problem, assemble
 from rft.laws.base import Medium
 
 STATUSES = np.array(["sliding", "stuck", "unconverged"])
@@ -151,46 +151,80 @@ def body_velocity(
     if threads is not None:
         in_range("threads", threads, 1, 1024, whole=True)
     batch = alpha.shape[:-1]
+    length = body_size(body)
     guess = None
     if start is not None:
-        guess = _guess(start, batch, body_size(body))
+        guess = _guess(start, batch, length)
+
     alpha = np.ascontiguousarray(alpha.reshape(-1, body.joints).T)
     alphadot = np.ascontiguousarray(alphadot.reshape(-1, body.joints).T)
-    speed = joint_speed(body, alphadot)
-    moving = speed > 0
-    if not moving.all():  # a body whose joints are at rest is at rest
-        index = np.flatnonzero(moving)
-        assembly = assembly.take(index)
-        alpha = alpha[:, index]
-        alphadot = alphadot[:, index]
-        speed = speed[index]
-        if guess is not None:
-            guess = guess[:, index]
-
-    def problem_at(index):
-        if index.size == speed.size:
-            return assembly.problem(alpha, alphadot, speed)
-        return assembly.take(index).problem(
-            alpha[:, index], alphadot[:, index], speed[index]
-        )
+    samples = Samples(assembly, alpha, alphadot, joint_speed(body, alphadot), guess)
+    # A body whose joints are at rest is at rest.
+    moving = samples.speed > 0
+    if not moving.all():
+        samples = samples.take(np.flatnonzero(moving))
 
     solved = solve(
-        problem_at,
-        speed,
+        samples.problem,
+        samples.speed,
         Accuracy(regularisation, tolerance),
-        assembly,
+        samples.assembly,
         backend,
         threads,
-        guess,
+        samples.guess,
     )
-    xi, residual, iterations, stuck, limit = _with_samples_at_rest(solved, moving)
-    length = body_size(body)
-    if length == 1.0:
-        xi = xi.T.reshape(*batch, 3)
-    else:
-        xi = (xi.T * [length, length, 1.0]).reshape(*batch, 3)
-    status = STATUSES[np.where(residual <= limit, stuck, UNCONVERGED)]
-    return Solution(xi, *(x.reshape(batch) for x in (residual, status, iterations)))
+    solved = _with_samples_at_rest(solved, moving)
+    return _solution(solved, batch, length)
+
+
+class Samples(NamedTuple):
+    """Samples of a body's motion, to be solved.
+
+    alpha, alphadot: (joints, B), shapes and rates. speed: (B,), of the joints. guess:
+    (3, B), velocities in body lengths to start from; None for none."""
+
+    assembly: Assembly
+    alpha: np.ndarray
+    alphadot: np.ndarray
+    speed: np.ndarray
+    guess: np.ndarray | None
+
+    def take(self, index: np.ndarray) -> Samples:
+        """Return some samples by their numbers."""
+        guess = self.guess
+        if guess is not None:
+            guess = guess[:, index]
+        return Samples(
+            self.assembly.take(index),
+            self.alpha[:, index],
+            self.alphadot[:, index],
+            self.speed[index],
+            guess,
+        )
+
+    def problem(self, index: np.ndarray) -> Problem:
+        """Return the problem of some samples by their numbers, in increasing order."""
+        if index.size == self.speed.size:
+            return self.assembly.problem(self.alpha, self.alphadot, self.speed)
+        return self.assembly.take(index).problem(
+            self.alpha[:, index], self.alphadot[:, index], self.speed[index]
+        )
+
+
+def _solution(solved: Solutions, batch: tuple[int, ...], length: float) -> Solution:
+    """Return solutions (B,) in body lengths as one of the shape of the batch, in the
+    unit of the body's ``length``."""
+    xi = solved.xi.T
+    if length != 1.0:
+        xi = xi * [length, length, 1.0]
+    within_limit = solved.residual <= solved.limit
+    status = STATUSES[np.where(within_limit, solved.stuck, UNCONVERGED)]
+    return Solution(
+        xi.reshape(*batch, 3),
+        solved.residual.reshape(batch),
+        status.reshape(batch),
+        solved.iterations.reshape(batch),
+    )
 
 
 def _with_samples_at_rest(solved: Solutions, moving: np.ndarray) -> Solutions:

@@ -118,9 +118,8 @@ def end_coordinates(v_t, v_n, v_w, rounding, q):
     """Return the elliptic coordinates of an element, with 1 - mu^2 and 1 - t^2 to full
     precision."""
     A2 = q * q * v_t * v_t + rounding * rounding
-    margin = absolute(v_n) - absolute(
-        v_w
-    )  # negative where the pivot lies in the element
+    # Negative where the pivot lies in the element.
+    margin = absolute(v_n) - absolute(v_w)
     u_near, u_far = absolute(margin), absolute(v_n) + absolute(v_w)
     R_near, R_far = sqrt(A2 + u_near * u_near), sqrt(A2 + u_far * u_far)
     two_over_S = 2.0 / (R_near + R_far + TINY)
@@ -158,13 +157,15 @@ def dry(v_t, v_n, v_w, rounding, q, k_t, k_n):
         v_t, v_n, v_w, rounding, q
     )
     k = k_function(t, one_minus_t2)
-    h, denominator = 1.0 - one_minus_t2 * k, one_minus_mu2 + mu * mu * one_minus_t2
+    h = 1.0 - one_minus_t2 * k
+    denominator = one_minus_mu2 + mu * mu * one_minus_t2
     inverse = 1.0 / (denominator * one_minus_t2 + TINY)
     p = one_minus_t2 * inverse  # 1 / (1 - mu^2 t^2) = S^2 / (4 R1 R2)
     four_over_S2 = two_over_S * two_over_S
     ratio = four_over_S2 * denominator * inverse  # (2 / S)^2 / (1 - t^2)
     mean_1_R = two_over_S * (1.0 + t * t * k)
-    mean_u_R3, mean_su_R3 = four_over_S2 * mu * p, ratio * t * (one_minus_mu2 * p - h)
+    mean_u_R3 = four_over_S2 * mu * p
+    mean_su_R3 = ratio * t * (one_minus_mu2 * p - h)
     mean_1_R3 = ratio * two_over_S * p
     q2v = q * q * v_t
     normal = k_n * two_over_S * one_minus_mu2 * p
@@ -295,14 +296,11 @@ def inclined_load(load, v, rounding, incline):
     # With wide rounding drag is viscous and weak, and the full weight would move the
     # body at enormous speeds.
     weight = weight / sqrt(1.0 + rounding * rounding)
-    factor, cosine = (
-        level_factor - loss * down,
-        down * inverse * inverse,
-    )  # the cosine over the speed
-    slope_t, slope_n = (
-        loss * (cosine * v[0] - down_t),
-        loss * (cosine * v[1] - down_n),
-    )  # of the factor
+    factor = level_factor - loss * down
+    # Slopes of the factor, with the cosine over the speed.
+    cosine = down * inverse * inverse
+    slope_t = loss * (cosine * v[0] - down_t)
+    slope_n = loss * (cosine * v[1] - down_n)
     return Load(
         factor * load.t - weight * down_t, factor * load.t_t + slope_t * load.t, factor * load.t_n + slope_n * load.t,
         factor * load.t_w,
@@ -350,10 +348,8 @@ def developed_direction(direction, before, now, step):
     total = where(total == 0.0, 1.0, total)
     old, new = absolute(before) / total, now / total
     # Travels backward and forward, over total x the duration of the step / 2.
-    backward_travel, forward_travel = (
-        where(forward, 0.0, old * old),
-        where(forward, old + new, new * new),
-    )
+    backward_travel = where(forward, 0.0, old * old)
+    forward_travel = where(forward, old + new, new * new)
     forward_slope = where(forward, 1.0, new * new + 2.0 * old * new)
     half_step = where(instant, 0.0, step) / 2.0
     turned = (1.0 + direction) * exp(-half_step * total * backward_travel)
@@ -369,9 +365,8 @@ def developed_share(direction, before, now, at_once, step):
     """Return the share of the drag on motion with the velocity ``now`` >= 0 after the
     step of `developed_direction`, and its slope in ``now``."""
     after, slope = developed_direction(direction, before, now, step)
-    return at_once + (1.0 - at_once) * (0.5 + 0.5 * after), (1.0 - at_once) * (
-        0.5 * slope
-    )
+    share = at_once + (1.0 - at_once) * (0.5 + 0.5 * after)
+    return share, (1.0 - at_once) * (0.5 * slope)
 
 
 @formula
@@ -379,10 +374,10 @@ def share_across(sign, intact, v_n, v_w, memory):
     """Return the share of the drag across on the part of an element that moves left
     (sign 1) or right (sign -1), and its slopes in v_n and v_w."""
     _, inside, _ = find_pivot(v_n, v_w)
-    now = where(
-        inside, 0.5 * (sign * v_n + absolute(v_w)), maximum(sign * v_n, 0.0)
-    )  # mean velocity of the part
-    direction, before = sign * memory.across, sign * memory.v_n_before
+    # Mean velocity of the part.
+    now = where(inside, 0.5 * (sign * v_n + absolute(v_w)), maximum(sign * v_n, 0.0))
+    direction = sign * memory.across
+    before = sign * memory.v_n_before
     value, slope = developed_share(
         direction, before, now, memory.at_once_across, memory.step_across
     )
@@ -425,12 +420,10 @@ def part_load(law, v_t, v_n, v_w, rounding, low, high, share):
     value, by_n, by_w = share
     c, h = 0.5 * (high + low), 0.5 * (high - low)  # centre and half length of the part
     f = law.average(v_t, v_n + v_w * c, h * v_w, rounding)
-    w, w_t, w_n, w_w = (
-        c * f.n + h * f.w,
-        c * f.n_t + h * f.w_t,
-        c * f.n_n + h * f.w_n,
-        c * f.n_w + h * f.w_w,
-    )
+    w = c * f.n + h * f.w
+    w_t = c * f.n_t + h * f.w_t
+    w_n = c * f.n_n + h * f.w_n
+    w_w = c * f.n_w + h * f.w_w
     return Load(
         h * f.t, h * f.t_t, h * f.t_n, h * (c * f.t_n + h * f.t_w),
         h * value * f.n, h * value * f.n_t, h * (value * f.n_n + by_n * f.n),

@@ -1,4 +1,5 @@
-"""Sand under the geoms of any MuJoCo model: resistive forces in ``mj_step``, by one call. Needs MuJoCo.
+"""Sand under the geoms of any MuJoCo model: resistive forces in ``mj_step``, by one
+call. Needs MuJoCo.
 
 with rft.mujoco.attach(model, "poppy-seeds-loose") as sand:
     mujoco.mj_step(model, data)

@@ -1,4 +1,5 @@
-"""Where the arrays of MuJoCo's structures lie, found at run time: no version's layout is written down."""
+"""Where the arrays of MuJoCo's structures lie, found at run time: no version's layout
+is written down."""
 
 from __future__ import annotations
 
@@ -15,14 +16,14 @@ import numpy as np
 from rft.core.refusal import require
 
 UNKNOWN = f"MuJoCo {mujoco.__version__} is unknown"
-FARTHEST = (
-    400_000  # bytes: where the search in a structure of 4.0, some 165 kB long, gives up
-)
+# Bytes: where the search in a structure of 4.0, some 165 kB long, gives up.
+FARTHEST = 400_000
 POINTERS = 30  # words after the first that may hold the same address
 NEFC_MAX = 100_000  # more rows or contacts than that are a fault of the search
 
-# Arrays of an mjData by name: shape in sizes of the model, and type. "rows": of all constraint rows, "entries": of the
-# entries of their Jacobian, "contacts": of the contacts; these lengths change from step to step.
+# Arrays of an mjData by name: shape in sizes of the model, and type. "rows": of all
+# constraint rows, "entries": of the entries of their Jacobian, "contacts": of the
+# contacts; these lengths change from step to step.
 ARRAYS = {
     "qfrc_passive": (("nv",), float),
     "geom_xpos": (("ngeom", 3), float),
@@ -61,8 +62,9 @@ FUNCTIONS = (
 
 
 class Contacts(NamedTuple):
-    """Where contacts lie. pointer: place of the pointer to the first one in an mjData, in units of 8 bytes. size: of one,
-    bytes. mu, friction, dim, address: of its fields, bytes from its start."""
+    """Where contacts lie. pointer: place of the pointer to the first one in an mjData,
+    in units of 8 bytes. size: of one, bytes. mu, friction, dim, address: of its fields,
+    bytes from its start."""
 
     pointer: int
     size: int
@@ -73,8 +75,9 @@ class Contacts(NamedTuple):
 
 
 class Places(NamedTuple):
-    """Where things lie in an mjData. arrays: places of the pointers to `ARRAYS`, in units of 8 bytes, -1 for those that
-    this version lacks. time: of the time, in units of 8 bytes. counts: of `COUNTS`, in units of 4 bytes."""
+    """Where things lie in an mjData. arrays: places of the pointers to `ARRAYS`, in
+    units of 8 bytes, -1 for those that this version lacks. time: of the time, in units
+    of 8 bytes. counts: of `COUNTS`, in units of 4 bytes."""
 
     arrays: dict[str, int]
     time: int
@@ -82,20 +85,30 @@ class Places(NamedTuple):
     contacts: Contacts
 
 
-# Models of different parts. An array without entries has the address of the next one that has some, so that one model alone
-# does not tell them apart. All have contacts of several kinds and more rows or fewer than before.
-BODY = """<body name="{0}" pos="{2} 0 {1}"><freejoint/><geom size="0.1" condim="{3}"/><site name="{0}"/><camera/><light/>
-<body><joint name="j{0}" frictionloss="0.1" damping="0.1"/><geom size="0.1"/></body></body>"""
+# Models of different parts. An array without entries has the address of the next one
+# that has some, so that one model alone does not tell them apart. All have contacts of
+# several kinds and more rows or fewer than before.
+BODY = """<body name="{0}" pos="{2} 0 {1}"><freejoint/>
+<geom size="0.1" condim="{3}"/><site name="{0}"/><camera/><light/>
+<body><joint name="j{0}" frictionloss="0.1" damping="0.1"/><geom size="0.1"/></body>
+</body>"""
 FLOOR = '<geom type="plane" size="9 9 1"/>'
 PARTS = """<worldbody><body mocap="true"><geom size="0.1"/></body></worldbody>
-<tendon><fixed name="t"><joint joint="ja" coef="1"/></fixed></tendon><equality><weld body1="a" body2="b"/></equality>
+<tendon><fixed name="t"><joint joint="ja" coef="1"/></fixed></tendon>
+<equality><weld body1="a" body2="b"/></equality>
 <actuator><motor joint="ja"/><general joint="jb" dyntype="integrator"/></actuator>
 <sensor><framepos objtype="site" objname="a"/></sensor>"""
+BODY_A = BODY.format("a", 0.09, 0, 3)
+BODY_A_OF_6 = BODY.format("a", 0.09, 0, 6)
+BODY_B = BODY.format("b", 0.08, 2, 4)
+FREE_BALL = '<body pos="0 0 0.09"><freejoint/><geom size="0.1"/></body>'
+HINGED_BALL = """<body><joint frictionloss="1"/>
+<geom size="0.1" pos="0 0 0.09"/></body>"""
 MODELS = (
-    f"<worldbody>{FLOOR}{BODY.format('a', 0.09, 0, 3)}</worldbody>",
-    f"<worldbody>{FLOOR}{BODY.format('a', 0.09, 0, 6)}{BODY.format('b', 0.08, 2, 4)}</worldbody>{PARTS}",
-    f"<worldbody>{FLOOR}<body pos='0 0 0.09'><freejoint/><geom size='0.1'/></body></worldbody>",
-    f"<worldbody>{FLOOR}<body><joint frictionloss='1'/><geom size='0.1' pos='0 0 0.09'/></body></worldbody>",
+    f"<worldbody>{FLOOR}{BODY_A}</worldbody>",
+    f"<worldbody>{FLOOR}{BODY_A_OF_6}{BODY_B}</worldbody>{PARTS}",
+    f"<worldbody>{FLOOR}{FREE_BALL}</worldbody>",
+    f"<worldbody>{FLOOR}{HINGED_BALL}</worldbody>",
 )
 
 
@@ -103,8 +116,9 @@ MODELS = (
 def places() -> Places:
     """Return where the arrays, the time and the counts lie in an mjData.
 
-    The address of each array is looked up in the structures of data of several models. Where it stands at more than one
-    place in all of them, the last is right: empty arrays come before the one whose address they share."""
+    The address of each array is looked up in the structures of data of several models.
+    Where it stands at more than one place in all of them, the last is right: empty
+    arrays come before the one whose address they share."""
     arrays: dict[str, set[int]] = {}
     counts: dict[str, set[int]] = {}
     times: set[int] = set()
@@ -113,7 +127,8 @@ def places() -> Places:
         option = f'<option cone="elliptic"/><size nuserdata="{k + 5}"/>'
         model = mujoco.MjModel.from_xml_string(f"<mujoco>{option}{text}</mujoco>")
         data = mujoco.MjData(model)
-        for lift in (0.0, 0.005, 1.0):  # with fewer and fewer rows
+        # Lifted bodies touch less, and have fewer constraint rows.
+        for lift in (0.0, 0.005, 1.0):
             data.qpos[2 if model.nq > 2 else 0] += lift
             mujoco.mj_forward(model, data)
             data.time = 0.1234567 * (k + 1) + lift
@@ -137,8 +152,8 @@ def places() -> Places:
             mujoco.mj_forward(model, data)
             fields = _fields_of_contact(data.contact)
     lacking = [x for x in ARRAYS if not arrays.get(x) and x not in NOT_EVERYWHERE]
-    right = not lacking and bool(contacts and times and all(counts.values()))
-    _require_known(right)
+    is_complete = not lacking and bool(contacts and times and all(counts.values()))
+    _require_known(is_complete)
     return Places(
         {name: max(arrays.get(name, [-1])) for name in ARRAYS},
         max(times),
@@ -163,7 +178,8 @@ def _numbers(data: mujoco.MjData, kind: type) -> np.ndarray:
 
 
 def _places(data: mujoco.MjData, address: int) -> set[int]:
-    """Return the places of all words from the start of the structure on that are an address, near the first of them."""
+    """Return the places of all words from the start of the structure on that are an
+    address, near the first of them."""
     found = np.flatnonzero(_numbers(data, np.int64) == address)
     return {*found[found < found[:1].sum() + POINTERS].tolist()}
 
@@ -172,9 +188,10 @@ def _address(array: np.ndarray) -> int:
     return array.__array_interface__["data"][0]
 
 
-def _require_known(right: bool) -> None:
+def _require_known(is_known: bool) -> None:
+    """Raise Refusal for a version of MuJoCo whose arrays are not found."""
     require(
-        right,
+        is_known,
         UNKNOWN,
         because="its arrays are not where they are looked for",
         instead="report it",
@@ -203,8 +220,9 @@ def _library() -> ctypes.CDLL:
     return ctypes.CDLL(str(found[0]))
 
 
-def takes_data() -> bool:
-    """Return whether mj_fullM takes the data, as since 4.0, or their matrix and that last."""
+def full_m_takes_data() -> bool:
+    """Return whether mj_fullM takes the data, as since 4.0, or their matrix and that
+    last."""
     return int(mujoco.__version__.partition(".")[0]) >= 4
 
 
@@ -220,7 +238,8 @@ def sizes_of(model: mujoco.MjModel) -> dict[str, int]:
 
 
 class Arrays:
-    """Arrays of the mjData at an address, which share its memory, by name; and the counts `COUNTS`."""
+    """Arrays of the mjData at an address, which share its memory, by name; and the
+    counts `COUNTS`."""
 
     def __init__(self, data: int, sizes: dict[str, int]):
         self._data = data
@@ -258,16 +277,17 @@ class Arrays:
         return ctypes.c_double.from_address(self._data + 8 * place).value
 
     def cones(self) -> Iterator[tuple[int, int, float, np.ndarray]]:
-        """Yield first row, number of rows, mu and the five coefficients of friction of the contacts."""
+        """Yield first row, number of rows, mu and the five coefficients of friction of
+        the contacts."""
         where = places().contacts
         first = self._word(where.pointer)
         for k in range(self.ncon):
-            at = first + k * where.size
-            friction = (ctypes.c_double * 5).from_address(at + where.friction)
+            contact = first + k * where.size
+            friction = (ctypes.c_double * 5).from_address(contact + where.friction)
             yield (
-                ctypes.c_int32.from_address(at + where.address).value,
-                ctypes.c_int32.from_address(at + where.dim).value,
-                ctypes.c_double.from_address(at + where.mu).value,
+                ctypes.c_int32.from_address(contact + where.address).value,
+                ctypes.c_int32.from_address(contact + where.dim).value,
+                ctypes.c_double.from_address(contact + where.mu).value,
                 np.ctypeslib.as_array(friction),
             )
 
@@ -299,14 +319,16 @@ def _step_offset() -> int:
 
 
 def _before_gravity(model: mujoco.MjModel, k: int) -> np.ndarray:
-    """Return the number, (1,), that stands k numbers before gravity in a model's mjOption; it shares its memory."""
+    """Return the number, (1,), that stands k numbers before gravity in a model's
+    mjOption; it shares its memory."""
     gravity = model.opt.gravity.__array_interface__["data"][0]
     return np.ctypeslib.as_array((ctypes.c_double * 1).from_address(gravity - 8 * k))
 
 
 @functools.cache
 def flag_offsets() -> dict[str, int]:
-    """Return where integrator and disabled flags stand in an mjOption, bytes from gravity."""
+    """Return where integrator and disabled flags stand in an mjOption, bytes from
+    gravity."""
     text = (
         '<mujoco><option integrator="{}"><flag energy="disable" {}/></option></mujoco>'
     )
@@ -321,14 +343,15 @@ def flag_offsets() -> dict[str, int]:
         gravity = model.opt.gravity.__array_interface__["data"][0]
         ints = np.ctypeslib.as_array((ctypes.c_int32 * 200).from_address(gravity))
         for name in ("integrator", "disableflags"):
-            here = {*np.flatnonzero(ints == getattr(model.opt, name)).tolist()}
-            found[name] = found.get(name, here) & here
+            matches = {*np.flatnonzero(ints == getattr(model.opt, name)).tolist()}
+            found[name] = found.get(name, matches) & matches
     _require_known(all(found.values()))
     return {name: 4 * min(where) for name, where in found.items()}
 
 
 def options_of(model: mujoco.MjModel) -> np.ndarray:
-    """Return integrator and disabled flags of a model, (2,) addresses of 32-bit integers in the model's own memory."""
+    """Return integrator and disabled flags of a model, (2,) addresses of 32-bit
+    integers in the model's own memory."""
     gravity = model.opt.gravity.__array_interface__["data"][0]
     offsets = flag_offsets()
     return np.array(

@@ -1,7 +1,8 @@
-"""Linear algebra of small systems, by NumPy; `rft.mujoco.compiled_algebra` defines it a second time for compiled code.
+"""Linear algebra of small systems, by NumPy; `rft.mujoco.compiled_algebra` defines it a
+second time for compiled code.
 
-Geoms have Jacobians (G, 6, n), from the velocities of n degrees of freedom to the twists of the geoms along their own
-axes; only some of these move a geom."""
+Geoms have Jacobians (G, 6, n), from the velocities of n degrees of freedom to the
+twists of the geoms along their own axes; only some of these move a geom."""
 
 from __future__ import annotations
 
@@ -13,15 +14,15 @@ def cholesky(matrix: np.ndarray) -> np.ndarray:
     return np.linalg.cholesky(matrix)
 
 
-def square_over(lower: np.ndarray, x: np.ndarray) -> float:
+def inverse_norm2(lower: np.ndarray, x: np.ndarray) -> float:
     """Return x . (L L^T)^-1 x for the lower factor L (n, n)."""
     y = np.linalg.solve(lower, x)
     return float(y @ y)
 
 
 def solve_linear(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Return the solution (n,) of linear equations, of numbers that are not finite for singular ones. Compiled code
-    loses the matrix."""
+    """Return the solution (n,) of linear equations, of numbers that are not finite for
+    singular ones. Compiled code loses the matrix."""
     try:
         return np.linalg.solve(matrix, right)
     except np.linalg.LinAlgError:
@@ -43,8 +44,9 @@ def add_outer(matrix: np.ndarray, factor: float, x: np.ndarray, y: np.ndarray) -
     matrix += factor * np.outer(x, y)
 
 
-def twists_of(motion, velocity: np.ndarray) -> np.ndarray:
-    """Return the twists (G, 6) of all geoms by the velocities (n,). motion: `rft.mujoco.implicit.Motion`."""
+def geom_twists(motion, velocity: np.ndarray) -> np.ndarray:
+    """Return the twists (G, 6) of all geoms by the velocities (n,). motion:
+    `rft.mujoco.implicit.Motion`."""
     return motion.jacobian @ velocity
 
 
@@ -54,12 +56,13 @@ def joint_forces(motion, wrenches: np.ndarray) -> np.ndarray:
 
 
 def add_projected(matrix: np.ndarray, factor: float, motion, slopes) -> None:
-    """Add a factor times the slopes (G, 6, 6) of wrenches by twists to a matrix (n, n), by the velocities."""
+    """Add a factor times the slopes (G, 6, 6) of wrenches by twists to a matrix (n, n),
+    by the velocities."""
     jacobian = motion.jacobian
     matrix += factor * (jacobian.swapaxes(1, 2) @ (slopes @ jacobian)).sum(0)
 
 
-def solve_over(lower: np.ndarray, x: np.ndarray) -> np.ndarray:
+def solve_cholesky(lower: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Return the solution (n,) of L L^T y = x for the lower factor L (n, n)."""
     return np.linalg.solve(lower.T, np.linalg.solve(lower, x))
 
@@ -69,11 +72,14 @@ def submatrix(matrix: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.n
     return matrix[np.ix_(rows, columns)]
 
 
-def blocks_of(trees: np.ndarray, jacobian: np.ndarray, used: np.ndarray) -> np.ndarray:
-    """Return for each degree of freedom (n,) the number of its block, 0, 1, ..., or -1 where nothing in it is used.
+def number_blocks(
+    trees: np.ndarray, jacobian: np.ndarray, used: np.ndarray
+) -> np.ndarray:
+    """Return for each degree of freedom (n,) the number of its block, 0, 1, ..., or -1
+    where nothing in it is used.
 
-    trees: (n,), number of the tree of each. jacobian: (r, n), of constraint rows, which join trees. used: (n,), whether
-    a degree of freedom moves a geom in the ground."""
+    trees: (n,), number of the tree of each. jacobian: (r, n), of constraint rows, which
+    join trees. used: (n,), whether a degree of freedom moves a geom in the ground."""
     block = trees.copy()
     for row in jacobian:
         joined = block[row != 0.0]

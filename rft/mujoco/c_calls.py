@@ -1,4 +1,5 @@
-"""Memory and C functions at addresses, for compiled code. Importing this module loads numba."""
+"""Memory and C functions at addresses, for compiled code. Importing this module loads
+numba."""
 
 from __future__ import annotations
 
@@ -38,7 +39,8 @@ def address_of(context, pointer):
 
 @intrinsic
 def call(context, function, arguments):
-    """Call the C function at an address, which returns nothing, with a tuple of pointers and numbers."""
+    """Call the C function at an address, which returns nothing, with a tuple of
+    pointers and numbers."""
 
     def emit(context, builder, sig, args):
         kinds = [context.get_value_type(kind) for kind in sig.args[1].types]
@@ -70,9 +72,11 @@ def short_integers_at(address, shape):
 
 
 def compiled_c(function, arguments: tuple, purpose: str, *modules) -> CFunc:
-    """Return a C function of arguments of these types, stored on disk; print one line if it has yet to be compiled.
+    """Return a C function of arguments of these types, stored on disk; print one line
+    if it has yet to be compiled.
 
-    modules: those whose source counts for what is stored (`rft.balance.cache.digest`)."""
+    modules: those whose source counts for what is stored
+    (`rft.balance.cache.digest`)."""
     signature = sigutils.normalize_signature(types.void(*arguments))
     compiled = CFunc(function, signature, {}, OPTIONS)
     if purpose:

@@ -1,5 +1,6 @@
-"""The functions of `rft.mujoco.algebra` for compiled code, in loops: of a dozen degrees of freedom they take a fraction of
-what calls of LAPACK do. Importing this module loads numba."""
+"""The functions of `rft.mujoco.algebra` for compiled code, in loops: of a dozen degrees
+of freedom they take a fraction of what calls of LAPACK do. Importing this module loads
+numba."""
 
 from __future__ import annotations
 
@@ -28,10 +29,11 @@ def _cholesky(matrix):
     return cholesky
 
 
-@overload(algebra.square_over)
-def _square_over(lower, x):
-    def square_over(lower, x):
-        n, total = len(x), 0.0
+@overload(algebra.inverse_norm2)
+def _inverse_norm2(lower, x):
+    def inverse_norm2(lower, x):
+        n = len(x)
+        total = 0.0
         y = np.empty(n)
         for i in range(n):
             y[i] = x[i]
@@ -41,7 +43,7 @@ def _square_over(lower, x):
             total += y[i] * y[i]
         return total
 
-    return square_over
+    return inverse_norm2
 
 
 @overload(algebra.solve_linear)
@@ -107,10 +109,12 @@ def _add_outer(matrix, factor, x, y):
     return add_outer
 
 
-@overload(algebra.twists_of)
-def _twists_of(motion, velocity):
-    def twists_of(motion, velocity):
-        jacobian, dofs, first = motion.jacobian, motion.dofs, motion.first
+@overload(algebra.geom_twists)
+def _geom_twists(motion, velocity):
+    def geom_twists(motion, velocity):
+        jacobian = motion.jacobian
+        dofs = motion.dofs
+        first = motion.first
         twists = np.zeros((len(jacobian), 6))
         for g in motion.members:
             for c in dofs[first[g] : first[g + 1]]:
@@ -118,13 +122,15 @@ def _twists_of(motion, velocity):
                     twists[g, i] += jacobian[g, i, c] * velocity[c]
         return twists
 
-    return twists_of
+    return geom_twists
 
 
 @overload(algebra.joint_forces)
 def _joint_forces(motion, wrenches):
     def joint_forces(motion, wrenches):
-        jacobian, dofs, first = motion.jacobian, motion.dofs, motion.first
+        jacobian = motion.jacobian
+        dofs = motion.dofs
+        first = motion.first
         forces = np.zeros(jacobian.shape[2])
         for g in motion.members:
             for c in dofs[first[g] : first[g + 1]]:
@@ -157,9 +163,9 @@ def _add_projected(matrix, factor, motion, slopes):
     return add_projected
 
 
-@overload(algebra.solve_over)
-def _solve_over(lower, x):
-    def solve_over(lower, x):
+@overload(algebra.solve_cholesky)
+def _solve_cholesky(lower, x):
+    def solve_cholesky(lower, x):
         n = len(x)
         y = np.empty(n)
         for i in range(n):
@@ -173,7 +179,7 @@ def _solve_over(lower, x):
             y[i] /= lower[i, i]
         return y
 
-    return solve_over
+    return solve_cholesky
 
 
 @overload(algebra.submatrix)
@@ -188,9 +194,9 @@ def _submatrix(matrix, rows, columns):
     return submatrix
 
 
-@overload(algebra.blocks_of)
-def _blocks_of(trees, jacobian, used):
-    def blocks_of(trees, jacobian, used):
+@overload(algebra.number_blocks)
+def _number_blocks(trees, jacobian, used):
+    def number_blocks(trees, jacobian, used):
         n = len(trees)
         block = trees.copy()
         for row in range(len(jacobian)):
@@ -201,12 +207,14 @@ def _blocks_of(trees, jacobian, used):
                 if joined < 0:
                     joined = block[i]
                     continue
-                low, high = min(joined, block[i]), max(joined, block[i])
+                low = min(joined, block[i])
+                high = max(joined, block[i])
                 for j in range(n):
                     if block[j] == high:
                         block[j] = low
                 joined = low
-        out, count = np.full(n, -1), 0
+        out = np.full(n, -1)
+        count = 0
         for i in range(n):
             if not used[i] or out[i] >= 0:
                 continue
@@ -216,4 +224,4 @@ def _blocks_of(trees, jacobian, used):
             count += 1
         return out
 
-    return blocks_of
+    return number_blocks

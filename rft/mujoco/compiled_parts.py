@@ -47,32 +47,33 @@ from rft.terradynamics.meshes.zones import (
 )
 
 FIELDS = 12  # vectors of eight that hold a part of eight faces
-SUMS, DAMPERS = 36, 10  # sums that the slopes of loads, and of dampers, follow from
+SLOPE_SUMS = 36  # that the slopes of loads follow from
+DAMPER_SUMS = 10  # that the slopes of dampers follow from
 LOADS, SLOPES, ADD_DAMPERS = range(3)  # what the C function adds
 
 
 class Grains(NamedTuple):
     """What the loads of a step follow from. code, solver: addresses of the C functions
     of `element_code` and of `rft.mujoco.compiled_solver.solver_code`. handle: (12,),
-    numbers and addresses that the first reads, by the names of `AT`. kept: the arrays
+    numbers and addresses that the first reads, by the names of `AT`. arrays: those
     there, which must outlive it."""
 
     code: int
     solver: int
     handle: np.ndarray
-    kept: tuple
+    arrays: tuple
 
 
 Handle = namedtuple(
     "Handle",
-    "n_geoms n_zones laws ground disturbed disturbed_rows disturbed_columns cache first up"
-    " ahead x",
+    "n_geoms n_zones laws ground disturbed disturbed_rows disturbed_columns cache first"
+    " up ahead x",
 )
 AT = Handle(*range(12))
 
 
 @register_jitable
-def _dips(spheres, k, motion):
+def _reaches_ground(spheres, k, motion):
     """Return whether the sphere around row number k of eight faces reaches below the
     surface."""
     x, y, z = motion.up
@@ -86,7 +87,7 @@ def cut_rows(table, spheres, begin, end, motion, zones, zone, place, cache, coun
     ``count`` on; return how many parts it has then. zone: of which the parts keep their
     share, negative for all."""
     for k in range(begin, end):
-        if not _dips(spheres, k, motion):
+        if not _reaches_ground(spheres, k, motion):
             continue
         face = read_face(table[k], 0)
         z = corner_heights(face, motion)
@@ -119,12 +120,13 @@ def cut(table, spheres, first, zones, n_zones, frames, cache_first, in_reach):
     radii (G,) of spheres around the geoms. in_reach: (G,), whether a geom may be in the
     ground."""
     frame, middles, radii = frames
-    geoms, capacity = len(radii), 0
+    geoms = len(radii)
+    capacity = 0
     for g in range(geoms):
         if in_reach[g]:
-            motion = _resting(frame, g)
+            motion = _motion_at_rest(frame, g)
             for k in range(first[g], first[g + 1]):
-                capacity += _dips(spheres, k, motion)
+                capacity += _reaches_ground(spheres, k, motion)
     # A row of eight faces across a boundary is kept once in each of the zones.
     cache = np.empty((FIELDS * max(capacity * n_zones, 1), WIDTH))
     count = 0
@@ -135,8 +137,7 @@ def cut(table, spheres, first, zones, n_zones, frames, cache_first, in_reach):
                 continue
             extent = 2
             if n_zones > 1:
-                x, y = middles[g, 0], middles[g, 1]
-                extent = extent_in(zones, zone, x, y, radii[g])
+                extent = extent_in(zones, zone, middles[g, 0], middles[g, 1], radii[g])
             if extent == NOWHERE:
                 continue
             only = zone if extent == PARTLY else -1
@@ -146,7 +147,7 @@ def cut(table, spheres, first, zones, n_zones, frames, cache_first, in_reach):
                 spheres,
                 first[g],
                 first[g + 1],
-                _resting(frame, g),
+                _motion_at_rest(frame, g),
                 zones,
                 only,
                 place,
@@ -158,7 +159,7 @@ def cut(table, spheres, first, zones, n_zones, frames, cache_first, in_reach):
 
 
 @register_jitable
-def _resting(frame, g):
+def _motion_at_rest(frame, g):
     """Return where a geom is, as a motion without velocity."""
     rest = (0.0, 0.0, 0.0)
     up = (frame.up[g, 0], frame.up[g, 1], frame.up[g, 2])
@@ -173,7 +174,7 @@ def handle_at(address):
 
 
 @register_jitable
-def grains_of(codes, sizes, laws, ground, disturbed, cache, first, frames):
+def pack_grains(codes, sizes, laws, ground, disturbed, cache, first, frames):
     """Return the grains of a step. codes: (2,), addresses of C functions. sizes: (2,),
     numbers of geoms and of zones.
 
@@ -182,12 +183,15 @@ def grains_of(codes, sizes, laws, ground, disturbed, cache, first, frames):
     each zone. frames: `rft.mujoco.parts.Frames`."""
     handle = np.empty(12, np.int64)
     handle[AT.n_geoms], handle[AT.n_zones] = sizes
-    handle[AT.laws], handle[AT.ground] = laws.ctypes.data, ground.ctypes.data
+    handle[AT.laws] = laws.ctypes.data
+    handle[AT.ground] = ground.ctypes.data
     handle[AT.disturbed] = disturbed.ctypes.data
     handle[AT.disturbed_rows] = disturbed.shape[0]
     handle[AT.disturbed_columns] = disturbed.shape[1]
-    handle[AT.cache], handle[AT.first] = cache.ctypes.data, first.ctypes.data
-    handle[AT.up], handle[AT.ahead] = frames.up.ctypes.data, frames.ahead.ctypes.data
+    handle[AT.cache] = cache.ctypes.data
+    handle[AT.first] = first.ctypes.data
+    handle[AT.up] = frames.up.ctypes.data
+    handle[AT.ahead] = frames.ahead.ctypes.data
     handle[AT.x] = frames.x.ctypes.data
     return Grains(
         codes[0], codes[1], handle, (laws, ground, disturbed, cache, first, frames)
@@ -218,7 +222,8 @@ def element_code(Law: type):
 
     def add_elements(handle, members, count, rounding, twists, out, kind):
         at = carray(handle, 12, np.int64)
-        n_geoms, n_zones = at[AT.n_geoms], at[AT.n_zones]
+        n_geoms = at[AT.n_geoms]
+        n_zones = at[AT.n_zones]
         geoms = carray(members, count, np.int64)
         moves = carray(twists, (n_geoms, 6), np.float64)
         wrenches = carray(out, (n_geoms, 6), np.float64)
@@ -234,7 +239,7 @@ def element_code(Law: type):
         up = numbers_at(at[AT.up], (n_geoms, 3))
         ahead = numbers_at(at[AT.ahead], (n_geoms, 3))
         x = numbers_at(at[AT.x], n_geoms)
-        sums = np.empty((SUMS, WIDTH))
+        sums = np.empty((SLOPE_SUMS, WIDTH))
         for zone in range(n_zones):
             law = Law(*to_fixed_tuple(laws[zone, :n_numbers], n_numbers))
             own = Ground(
@@ -246,7 +251,8 @@ def element_code(Law: type):
                 disturbed,
             )
             for g in geoms:
-                begin, end = first[zone * n_geoms + g], first[zone * n_geoms + g + 1]
+                begin = first[zone * n_geoms + g]
+                end = first[zone * n_geoms + g + 1]
                 if begin == end:
                     continue
                 t = moves[g]
@@ -285,13 +291,15 @@ def element_code(Law: type):
 def add_loads(law, ground, cache, begin, end, motion, wrench):
     """Add the wrench of parts of eight faces from ``begin`` to ``end``."""
     zero = 0.0 * read(cache, 0)
-    force, moment = (zero, zero, zero), (zero, zero, zero)
+    force = (zero, zero, zero)
+    moment = (zero, zero, zero)
     for k in range(begin, end):
         part, sheet = _read_part(cache, k)
         v = velocity_of_middle(part, motion)
         if any_of((dot(part.n, v) >= 0.0) | sheet):  # others bear nothing
             f, m, _ = load(law, ground, part, motion, v, sheet)
-            force, moment = plus(force, f), plus(moment, m)
+            force = plus(force, f)
+            moment = plus(moment, m)
     for i in range(3):
         wrench[i] += sum_of(force[i])
         wrench[3 + i] += sum_of(moment[i])
@@ -299,8 +307,8 @@ def add_loads(law, ground, cache, begin, end, motion, wrench):
 
 @register_jitable
 def add_slopes(law, ground, cache, begin, end, motion, sums, slopes):
-    """Add the slopes (6, 6) of the wrench of parts by the twist. sums: (SUMS, 8), of
-    which nothing is kept."""
+    """Add the slopes (6, 6) of the wrench of parts by the twist. sums: (SLOPE_SUMS, 8),
+    of which nothing is kept."""
     sums[:] = 0.0
     for k in range(begin, end):
         part, sheet = _read_part(cache, k)
@@ -350,8 +358,8 @@ def add_dampers(law, ground, cache, begin, end, motion, sums, slopes):
         add_vector(sums, 7, size * x * y)
         add_vector(sums, 8, size * y * z)
         add_vector(sums, 9, size * z * x)
-    total = np.empty(DAMPERS)
-    for i in range(DAMPERS):
+    total = np.empty(DAMPER_SUMS)
+    for i in range(DAMPER_SUMS):
         total[i] = sum_of(read(sums, i))
     _add_damper(slopes, total)
 
@@ -360,8 +368,10 @@ def add_dampers(law, ground, cache, begin, end, motion, sums, slopes):
 def _add_damper(slopes, total):
     """Add the slopes (6, 6) of a damper from sums of its size, times nothing, x, y, z,
     x^2, y^2, z^2, x y, y z and z x."""
-    size, x, y, z = total[0], total[1], total[2], total[3]
-    xx, yy, zz, xy, yz, zx = total[4], total[5], total[6], total[7], total[8], total[9]
+    size = total[0]
+    x, y, z = total[1], total[2], total[3]
+    xx, yy, zz = total[4], total[5], total[6]
+    xy, yz, zx = total[7], total[8], total[9]
     for i in range(3):
         slopes[i, i] += size
     _add_pair(slopes, 0, 4, z)
@@ -399,22 +409,22 @@ def _add(grains, members, rounding, twists, out, kind):
     call(grains.code, arguments)
 
 
-@overload(parts.loads)
-def _loads(grains, members, rounding, twists, wrenches):
-    def loads(grains, members, rounding, twists, wrenches):
+@overload(parts.write_wrenches)
+def _write_wrenches(grains, members, rounding, twists, wrenches):
+    def write_wrenches(grains, members, rounding, twists, wrenches):
         wrenches[:] = 0.0
         _add(grains, members, rounding, twists, wrenches, LOADS)
 
-    return loads
+    return write_wrenches
 
 
-@overload(parts.loads_with_slopes)
-def _loads_with_slopes(grains, members, rounding, twists, slopes):
-    def loads_with_slopes(grains, members, rounding, twists, slopes):
+@overload(parts.write_slopes)
+def _write_slopes(grains, members, rounding, twists, slopes):
+    def write_slopes(grains, members, rounding, twists, slopes):
         slopes[:] = 0.0
         _add(grains, members, rounding, twists, slopes, SLOPES)
 
-    return loads_with_slopes
+    return write_slopes
 
 
 @overload(parts.add_dampers)

@@ -1,7 +1,8 @@
-"""The solution of a block (`rft.mujoco.implicit.solve_block`) as a C function of its own. Importing this module loads numba.
+"""The solution of a block (`rft.mujoco.implicit.solve_block`) as a C function of its
+own. Importing this module loads numba.
 
-Compiled within the callback it would be optimised anew with each function above it: two minutes in place of some
-seconds."""
+Compiled within the callback it would be optimised anew with each function above it: two
+minutes in place of some seconds."""
 
 from __future__ import annotations
 
@@ -43,13 +44,16 @@ for function in (*implicit.COMPILED, *rows.COMPILED):
 
 @functools.cache
 def solver_code() -> Callable:
-    """Return the C function (block, numbers) that solves a block. block: int64, by the names of `AT`. numbers: (N_NUMBERS,),
-    step, rounding and accuracy, and where the `Result` goes."""
+    """Return the C function (block, numbers) that solves a block. block: int64, by the
+    names of `AT`. numbers: (N_NUMBERS,), step, rounding and accuracy, and where the
+    `Result` goes."""
 
     def solve_one(block, numbers):
         at = carray(block, SIZE, np.int64)
         number = carray(numbers, N_NUMBERS, np.float64)
-        n, geoms, n_rows = at[AT.n], at[AT.n_geoms], at[AT.n_rows]
+        n = at[AT.n]
+        geoms = at[AT.n_geoms]
+        n_rows = at[AT.n_rows]
         motion = Motion(
             numbers_at(at[AT.jacobian], (geoms, 6, n)),
             integers_at(at[AT.members], at[AT.n_members]),
@@ -100,10 +104,14 @@ def _solve_block(system, rows, grains, rounding, accuracy, point):
     def solve_block(system, rows, grains, rounding, accuracy, point):
         motion = system.motion
         at = np.empty(SIZE, np.int64)
-        at[AT.n], at[AT.n_geoms] = len(system.force), len(motion.jacobian)
-        at[AT.n_members], at[AT.n_dofs] = len(motion.members), len(motion.dofs)
-        at[AT.n_rows], at[AT.n_cones] = len(rows.weight), len(rows.cones)
-        at[AT.code], at[AT.grains] = grains.code, grains.handle.ctypes.data
+        at[AT.n] = len(system.force)
+        at[AT.n_geoms] = len(motion.jacobian)
+        at[AT.n_members] = len(motion.members)
+        at[AT.n_dofs] = len(motion.dofs)
+        at[AT.n_rows] = len(rows.weight)
+        at[AT.n_cones] = len(rows.cones)
+        at[AT.code] = grains.code
+        at[AT.grains] = grains.handle.ctypes.data
         at[AT.inertia] = system.inertia.ctypes.data
         at[AT.effective] = system.effective.ctypes.data
         at[AT.lower] = system.lower.ctypes.data
@@ -125,7 +133,8 @@ def _solve_block(system, rows, grains, rounding, accuracy, point):
         at[AT.wrenches] = point.wrenches.ctypes.data
         at[AT.residual] = point.residual.ctypes.data
         number = np.empty(N_NUMBERS)
-        number[STEP], number[ROUNDING] = system.step, rounding
+        number[STEP] = system.step
+        number[ROUNDING] = rounding
         number[ACCURACY] = accuracy
         arguments = pointer_to(at.ctypes.data), pointer_to(number.ctypes.data)
         call(grains.solver, arguments)

@@ -1,8 +1,8 @@
 """The equations of a step of all robots in the sand, block by block.
 
-Trees of bodies that constraints join, or that stand alone, are a block; blocks without a geom in the ground need no
-solution. What the force without grains is made of follows MuJoCo's own order (`mj_step`). Compiled code takes these
-functions, too."""
+Trees of bodies that constraints join, or that stand alone, are a block; blocks without
+a geom in the ground need no solution. What the force without grains is made of follows
+MuJoCo's own order (`mj_step`). Compiled code takes these functions, too."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.mujoco.algebra import (
-    blocks_of,
     dot,
+    geom_twists,
     multiply,
+    number_blocks,
+    solve_cholesky,
     solve_linear,
-    solve_over,
     submatrix,
-    twists_of,
 )
 from rft.mujoco.implicit import (
     SOLVED,
     Motion,
     Result,
-    point_at,
+    block_system,
+    new_point,
     solve_block,
-    system_of,
 )
 from rft.mujoco.rows import ELLIPTIC, Rows
 
@@ -34,11 +34,14 @@ FASTEST = 1e10  # mjMAXVAL: velocities beyond that are bad, and MuJoCo begins an
 
 
 class Inputs(NamedTuple):
-    """All that the motion of a model's n degrees of freedom in a step follows from, without the grains.
+    """All that the motion of a model's n degrees of freedom in a step follows from,
+    without the grains.
 
-    inertia, effective: (n, n), M and N of `rft.mujoco.implicit`. is_damped: whether these differ. force, velocity, start:
-    (n,), tau, v and the acceleration to start from. step: s. jacobian, dofs, first: of all geoms, as of `Motion`. in_ground:
-    (G,). rows: those of MuJoCo's constraints, by all degrees of freedom. trees: (n,), of each degree of freedom."""
+    inertia, effective: (n, n), M and N of `rft.mujoco.implicit`. is_damped: whether
+    these differ. force, velocity, start: (n,), tau, v and the acceleration to start
+    from. step: s. jacobian, dofs, first: of all geoms, as of `Motion`. in_ground: (G,).
+    rows: those of MuJoCo's constraints, by all degrees of freedom. trees: (n,), of each
+    degree of freedom."""
 
     inertia: np.ndarray
     effective: np.ndarray
@@ -58,9 +61,11 @@ class Inputs(NamedTuple):
 def add_body_forces(
     force, body_forces, places, centers, cdof, last_dofs, roots, parents
 ):
-    """Add the generalised forces of forces and moments on bodies (B, 6), at places (B, 3), to a force (n,).
+    """Add the generalised forces of forces and moments on bodies (B, 6), at places
+    (B, 3), to a force (n,).
 
-    centers: (B, 3), subtree_com. last_dofs, roots: (B,), of each body. parents: (n,), of each degree of freedom."""
+    centers: (B, 3), subtree_com. last_dofs, roots: (B,), of each body. parents: (n,),
+    of each degree of freedom."""
     for body in range(len(body_forces)):
         f = body_forces[body]
         dof = last_dofs[body]
@@ -80,22 +85,25 @@ def add_body_forces(
 def add_implicit_terms(
     effective, step, integrator, damping, derivative, row_of, column_of
 ):
-    """Add what the integrator takes implicitly to the inertia (n, n), and return whether there is any.
+    """Add what the integrator takes implicitly to the inertia (n, n), and return
+    whether there is any.
 
-    damping: (n,), of the joints. derivative: (k,), of the smooth forces by the velocities, in the rows and columns
-    ``row_of`` and ``column_of`` (k,)."""
+    damping: (n,), of the joints. derivative: (k,), of the smooth forces by the
+    velocities, in the rows and columns ``row_of`` and ``column_of`` (k,)."""
     is_damped = False
     if integrator in (IMPLICIT, IMPLICIT_FAST):
         for k in range(len(derivative)):
             if derivative[k] == 0.0:
                 continue
             is_damped = True
-            i, j, own = row_of[k], column_of[k], step * derivative[k]
+            i = row_of[k]
+            j = column_of[k]
+            term = step * derivative[k]
             if integrator == IMPLICIT_FAST:
-                effective[i, j] -= 0.5 * own
-                effective[j, i] -= 0.5 * own
+                effective[i, j] -= 0.5 * term
+                effective[j, i] -= 0.5 * term
             else:
-                effective[i, j] -= own
+                effective[i, j] -= term
     elif integrator != RUNGE_KUTTA:
         for i in range(len(damping)):
             if damping[i] != 0.0:
@@ -106,24 +114,29 @@ def add_implicit_terms(
 
 def elliptic_rows(kinds, cones, scales):
     """Return the elliptic contacts among contacts (c, 2) that have rows."""
-    kept = np.zeros(len(cones), np.bool_)
+    is_elliptic = np.zeros(len(cones), np.bool_)
     for c in range(len(cones)):
-        first, count = cones[c, 0], cones[c, 1]
-        kept[c] = first >= 0 and count > 1 and kinds[max(first, 0)] == ELLIPTIC
-    kept_ones = np.flatnonzero(kept)
-    return cones[kept_ones], scales[kept_ones]
+        first = cones[c, 0]
+        count = cones[c, 1]
+        is_elliptic[c] = first >= 0 and count > 1 and kinds[max(first, 0)] == ELLIPTIC
+    index = np.flatnonzero(is_elliptic)
+    return cones[index], scales[index]
 
 
 def solve_blocks(inputs, grains, rounding, accuracy, wrenches, twists) -> tuple:
-    """Write the wrenches (G, 6) of the grains on the geoms and their twists at the end of the step, along the geoms' axes.
+    """Write the wrenches (G, 6) of the grains on the geoms and their twists at the end
+    of the step, along the geoms' axes.
 
-    Returns the `Result` of the worst block, and the geom in it that bears most, -1 for none."""
+    Returns the `Result` of the worst block, and the geom in it that bears most, -1 for
+    none."""
     used = np.zeros(len(inputs.velocity), np.bool_)
     for geom in range(len(inputs.in_ground)):
         if inputs.in_ground[geom]:
             used[inputs.dofs[inputs.first[geom] : inputs.first[geom + 1]]] = True
-    block = blocks_of(inputs.trees, inputs.rows.jacobian, used)
-    worst, geom, iterations = Result(0.0, SOLVED, rounding, 0), -1, 0
+    block = number_blocks(inputs.trees, inputs.rows.jacobian, used)
+    worst = Result(0.0, SOLVED, rounding, 0)
+    geom = -1
+    iterations = 0
     for number in range(block.max() + 1):
         dofs = np.flatnonzero(block == number)
         own, members = _solve_one(
@@ -131,18 +144,21 @@ def solve_blocks(inputs, grains, rounding, accuracy, wrenches, twists) -> tuple:
         )
         iterations += own.iterations
         if own.status > worst.status or own.residual > worst.residual:
-            worst, geom = own, _strongest(members, wrenches)
+            worst = own
+            geom = _most_loaded_geom(members, wrenches)
     result = Result(worst.residual, worst.status, worst.rounding, iterations)
     return result, geom
 
 
-def _strongest(members, wrenches) -> int:
+def _most_loaded_geom(members, wrenches) -> int:
     """Return the geom on which the grains exert the largest force."""
-    best, geom = -1.0, -1
+    largest = -1.0
+    geom = -1
     for g in members:
-        size = dot(wrenches[g, :3], wrenches[g, :3])
-        if size > best:
-            best, geom = size, g
+        force2 = dot(wrenches[g, :3], wrenches[g, :3])
+        if force2 > largest:
+            largest = force2
+            geom = g
     return geom
 
 
@@ -154,7 +170,7 @@ def _solve_one(
     place[dofs] = np.arange(len(dofs))
     motion = _motion_of_block(inputs, block, number, dofs, place)
     rows = _rows_of_block(inputs.rows, dofs)
-    system = system_of(
+    system = block_system(
         submatrix(inputs.inertia, dofs, dofs),
         submatrix(inputs.effective, dofs, dofs),
         inputs.force[dofs],
@@ -166,14 +182,14 @@ def _solve_one(
     if inputs.is_damped:
         start = solve_linear(system.effective.copy(), multiply(system.inertia, start))
         for i in range(len(rows.weight)):
-            own = solve_over(system.lower, rows.jacobian[i])
+            own = solve_cholesky(system.lower, rows.jacobian[i])
             rows.by_change[i] = multiply(system.effective.T, own)
     if not (system.velocity + system.step * start).any():
-        # Nothing would move, where the stress has no slope: as if there were no grains.
+        # At rest the stress has no slope: start as if there were no grains.
         start = solve_linear(system.effective.copy(), system.force)
-    point = point_at(start, len(wrenches))
+    point = new_point(start, len(wrenches))
     result = solve_block(system, rows, grains, rounding, accuracy, point)
-    ends = twists_of(motion, system.velocity + system.step * point.change)
+    ends = geom_twists(motion, system.velocity + system.step * point.change)
     for g in motion.members:
         wrenches[g] = point.wrenches[g]
         twists[g] = ends[g]
@@ -185,7 +201,8 @@ def _motion_of_block(inputs, block, number, dofs, place) -> Motion:
     geoms = len(inputs.in_ground)
     own = np.zeros(geoms, np.bool_)
     for g in range(geoms):
-        begin, end = inputs.first[g], inputs.first[g + 1]
+        begin = inputs.first[g]
+        end = inputs.first[g + 1]
         if inputs.in_ground[g] and end > begin:
             own[g] = block[inputs.dofs[begin]] == number
     jacobian = np.zeros((geoms, 6, len(dofs)))
@@ -201,26 +218,26 @@ def _rows_of_block(rows, dofs) -> Rows:
     acts = np.zeros(len(rows.weight), np.bool_)
     for i in range(len(acts)):
         acts[i] = rows.jacobian[i][dofs].any()
-    kept = np.flatnonzero(acts)
+    index = np.flatnonzero(acts)
     position = np.full(len(acts), -1)
-    position[kept] = np.arange(len(kept))
+    position[index] = np.arange(len(index))
     in_block = np.zeros(len(rows.cones), np.bool_)
     cones = rows.cones.copy()
     for c in range(len(cones)):
         first = position[cones[c, 0]]
         in_block[c] = first >= 0
         cones[c, 0] = first
-    kept_cones = np.flatnonzero(in_block)
-    jacobian = submatrix(rows.jacobian, kept, dofs)
+    cone_index = np.flatnonzero(in_block)
+    jacobian = submatrix(rows.jacobian, index, dofs)
     return Rows(
         jacobian,
         jacobian.copy(),
-        rows.weight[kept],
-        rows.reference[kept],
-        rows.kinds[kept],
-        rows.limits[kept],
-        cones[kept_cones],
-        rows.scales[kept_cones],
+        rows.weight[index],
+        rows.reference[index],
+        rows.kinds[index],
+        rows.limits[index],
+        cones[cone_index],
+        rows.scales[cone_index],
     )
 
 
@@ -229,7 +246,7 @@ COMPILED = (
     add_implicit_terms,
     elliptic_rows,
     solve_blocks,
-    _strongest,
+    _most_loaded_geom,
     _solve_one,
     _motion_of_block,
     _rows_of_block,

@@ -80,8 +80,8 @@ def _places_after(
     substeps: int,
     control: Control | None,
 ) -> np.ndarray:
-    """Return the places of the geoms, (G, 3), m, after a run from a state with each time
-    step in ``substeps`` parts."""
+    """Return the places of the geoms, (G, 3), m, after a run from a state with each
+    time step in ``substeps`` parts."""
     own = copy.copy(model)
     own.opt.timestep = model.opt.timestep / substeps
     data = mujoco.MjData(own)
@@ -104,8 +104,8 @@ def _places_after(
 def _with_half_elements(
     model: mujoco.MjModel, bed: Bed, hulls: bool, element: float | None
 ) -> Bed:
-    """Return the bed with elements half as long on each geom. element: m, of edges; None
-    for those that the shapes ask for."""
+    """Return the bed with elements half as long on each geom. element: m, of edges;
+    None for those that the shapes ask for."""
     if element:
         half, share = element / 2, 1.0
     else:

@@ -1,5 +1,5 @@
-"""An example robot, a hexapod on a floor: 1.3 kg, legs that rotate about the y axis. All
-its sizes are assumed."""
+"""An example robot, a hexapod on a floor: 1.3 kg, legs that rotate about the y axis.
+All its sizes are assumed."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ ROBOT = """<mujoco>
 
 
 def hexapod() -> mujoco.MjModel:
-    """Return the compiled robot, with a floor at z = 0; positive rates of its legs drive
-    it along x."""
+    """Return the compiled robot, with a floor at z = 0; positive rates of its legs
+    drive it along x."""
     legs = [LEG.format(x, y, k) for k, (x, y) in enumerate(HIPS)]
     motors = [MOTOR.format(k) for k in range(len(HIPS))]
     text = ROBOT.format("".join(legs), "".join(motors))

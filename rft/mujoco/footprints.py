@@ -1,18 +1,25 @@
-"""Ground that remembers: heights on a grid, which geoms press down and heap up, and which slide at the angle of repose.
+"""Ground that remembers: heights on a grid, which geoms press down and heap up, and
+which slide at the angle of repose.
 
-Heights are counted from the undisturbed surface. What one simulation remembers lies in the ``userdata`` of its MjData, all
-zeros for undisturbed ground, so that copies, resets and batches of MuJoCo carry it along. Whenever the time has changed,
+Heights are counted from the undisturbed surface. The memory of a simulation lies in the
+``userdata`` of its MjData, all zeros for undisturbed ground, so that copies, resets and
+batches of MuJoCo carry it along. Whenever the time has changed,
 
-- points on the surface of each geom press the cells that they are in down to the deepest point. The cell is lowered once
-  the geom has left it; until then the geom goes on to see the ground as it was;
-- the volume that is pressed away is heaped on the cells around the geom, in all directions in proportion to its speed
-  down, and ahead of it in proportion to its speed along (assumed);
-- where the ground is steeper than the angle of repose, the excess slides to the neighbours, in a tenth of the time in which
-  grains fall by one cell (assumed). Cells under geoms neither give nor take.
+- points on the surface of each geom press the cells that they are in down to the
+  deepest point. The cell is lowered once the geom has left it; until then the geom
+  still sees the ground as it was;
+- the volume that is pressed away is heaped on the cells around the geom, in all
+  directions in proportion to its speed down, and ahead of it in proportion to its speed
+  along (assumed);
+- where the ground is steeper than the angle of repose, the excess slides to the
+  neighbours, in a tenth of the time in which grains fall by one cell (assumed). Cells
+  under geoms neither give nor take.
 
-Each geom bears what it bears in level ground of the mean height of the cells where it is in the ground. The heap that it
-has raised since it was last out of the ground does not count: the stresses of the laws were measured with such a heap.
-Geoms wholly below the ground press nothing: grains close behind them (assumed). Compiled code takes these functions, too."""
+The force on a geom is that in level ground of the mean height of the cells where it is
+in the ground. The heap that it has raised since it was last out of the ground does not
+count: the stresses of the laws were measured with such a heap. Geoms wholly below the
+ground press nothing: grains close behind them (assumed). Compiled code calls these
+functions, too."""
 
 from __future__ import annotations
 
@@ -28,14 +35,16 @@ from rft.core.refusal import require
 from rft.laws.catalogue import REPOSE
 from rft.mujoco.hills import tangent_plane
 
-MOST_CELLS = 1_000_000
-EVERY = 256.0  # steps: how often the highest ground is looked for again
+MAX_CELLS = 1_000_000
+TOP_INTERVAL = 256.0  # steps between two searches for the highest ground
 RIM = 2  # cells: how far around a geom its heap is raised at once, assumed
-SHARE = 0.25  # of the excess of a slope that slides in one step at most; with more, left and right differ more
-SLIDES = (
-    0.1  # time in which an excess slides over that in which grains fall by one cell
-)
-STEEPER = 1e-3  # share by which a slope may be steeper than it should
+# Share of the excess of a slope that slides in one step at most; with a larger one,
+# left and right differ more.
+MAX_SHARE = 0.25
+# Time in which an excess slides over that in which grains fall by one cell.
+SLIDING_TIME = 0.1
+STEEPER = 1e-3  # share by which a slope may exceed the angle of repose
+DIAGONAL = 1.4142135623730951  # distance of diagonal neighbours over the spacing
 HEAD, PER_GEOM, PER_CELL = 8, 7, 5  # numbers that a simulation remembers
 TIME, STAMP, TOP, BOX, FORM = 0, 1, 2, 3, 7  # places in the head; the box takes four
 
@@ -44,8 +53,9 @@ TIME, STAMP, TOP, BOX, FORM = 0, 1, 2, 3, 7  # places in the head; the box takes
 class Footprints:
     """Ground that remembers, on a grid of cells.
 
-    spacing: of the cells, m. length, width: of the grid along x and y, m, around the place ``x``, ``y``; the ground beyond it
-    remembers nothing. repose: rad; the default is that of `rft.terradynamics.ground.Slope`.
+    spacing: of the cells, m. length, width: of the grid along x and y, m, around the
+    place ``x``, ``y``; the ground beyond it remembers nothing. repose: rad; the default
+    is that of `rft.terradynamics.ground.Slope`.
 
     Examples
     --------
@@ -67,41 +77,44 @@ class Footprints:
         check_numbers(self)
         rows, columns = self.shape
         require(
-            rows * columns <= MOST_CELLS,
-            f"footprints have {rows * columns} cells, more than {MOST_CELLS}",
+            rows * columns <= MAX_CELLS,
+            f"footprints have {rows * columns} cells, more than {MAX_CELLS}",
         )
 
     @property
     def shape(self) -> tuple[int, int]:
         """Number of rows, along y, and of columns, along x."""
-        return max(1, round(self.width / self.spacing)), max(
-            1, round(self.length / self.spacing)
-        )
+        rows = max(1, round(self.width / self.spacing))
+        columns = max(1, round(self.length / self.spacing))
+        return rows, columns
 
     @property
     def middles(self) -> tuple[np.ndarray, np.ndarray]:
         """Places x (C,) and y (R,) of the middles of the cells, m."""
         rows, columns = self.shape
-        along = lambda count, middle: (
-            middle + self.spacing * (np.arange(count) - (count - 1) / 2)
-        )
-        return along(columns, self.x), along(rows, self.y)
+        x = self.x + self.spacing * (np.arange(columns) - (columns - 1) / 2)
+        y = self.y + self.spacing * (np.arange(rows) - (rows - 1) / 2)
+        return x, y
 
     @property
     def grid(self) -> np.ndarray:
-        """Numbers that `remember` reads: the corner x and y, m, the spacing, m, the tangent of the angle of repose, and the
-        time in which an excess slides, s."""
+        """Numbers that `remember` reads: the corner x and y, m, the spacing, m, the
+        tangent of the angle of repose, and the time in which an excess slides, s."""
         x, y = self.middles
-        half, time = self.spacing / 2, SLIDES * math.sqrt(2 * self.spacing / GRAVITY)
+        half = self.spacing / 2
+        time = SLIDING_TIME * math.sqrt(2 * self.spacing / GRAVITY)
         return np.array(
             [x[0] - half, y[0] - half, self.spacing, math.tan(self.repose), time]
         )
 
 
 class Prints(NamedTuple):
-    """What footprints follow from. shape: rows and columns. geoms: number of geoms. grid: `Footprints.grid`, and a
-    number that no other grid and number of geoms has. surface: (R, C),
-    undisturbed heights, m. points: (P, 3), on the geoms in their frames, m. first: (G + 1,), first point of each geom."""
+    """The grid of footprints over a bed, and the points of geoms that press the ground.
+
+    shape: rows and columns. geoms: number of geoms. grid: `Footprints.grid`, and a
+    number that no other grid and number of geoms has. surface: (R, C), undisturbed
+    heights, m. points: (P, 3), on the geoms in their frames, m. first: (G + 1,), first
+    point of each geom."""
 
     shape: tuple[int, int]
     geoms: int
@@ -132,15 +145,18 @@ class Prints(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What a simulation remembers, views of its userdata.
+    """The memory of a simulation, views of its userdata.
 
-    head: the time, a number for each step, a height, m, that no ground is above, the box of cells that move: first
-    row and end, first column and end, and the number of the grid that all this is of, the last of ``Prints.grid``.
-    levels: (G,), mean height of the ground that each geom is in, m. carried: (G,), m, sum over cells of what each
-    geom has pressed away and not heaped up yet. visits: (G,), a number for each time that a geom was in the ground,
-    of no other geom. boxes: (G, 4), of cells under each geom. ground: (R, C), m. pressed: (R, C), m, how far geoms
-    press the cells that they are in down, negative. marks: (R, C), the number of the last step in which a geom was in
-    a cell. owners: (R, C), the visit in which a cell was heaped up last. floors: (R, C), m, its height before."""
+    head: the time; a number for each step, the stamp; a height, m, that no ground is
+    above; the box of cells that move: first row and end, first column and end; and the
+    number of the grid that the memory belongs to, the last of ``Prints.grid``. levels:
+    (G,), mean height of the ground that each geom is in, m. carried: (G,), m, sum over
+    cells of what each geom has pressed away and not heaped up yet. visits: (G,), a
+    number for each time that a geom was in the ground, of no other geom. boxes: (G, 4),
+    of cells under each geom. ground: (R, C), m. pressed: (R, C), m, how far geoms press
+    the cells that they are in down, negative. marks: (R, C), the stamp of the last step
+    in which a geom was in a cell. owners: (R, C), the visit in which a cell was heaped
+    up last. floors: (R, C), m, its height before."""
 
     head: np.ndarray
     levels: np.ndarray
@@ -156,7 +172,8 @@ class Memory(NamedTuple):
 
 def memory_of(numbers, geoms, rows, columns) -> Memory:
     """Return the memory in an array of numbers, the last that userdata has."""
-    cells, start = rows * columns, HEAD + PER_GEOM * geoms
+    cells = rows * columns
+    start = HEAD + PER_GEOM * geoms
     return Memory(
         numbers[:HEAD],
         numbers[HEAD : HEAD + geoms],
@@ -172,41 +189,49 @@ def memory_of(numbers, geoms, rows, columns) -> Memory:
 
 
 def begin_step(memory, time, form) -> float:
-    """Return the time, s, since the last step that was remembered, at most 1 s; negative if there is nothing to do. At time 0,
-    and where the memory is of another grid than that with the number ``form``, the ground is undisturbed."""
+    """Return the time, s, since the last step that was remembered, at most 1 s;
+    negative if there is nothing to do.
+
+    At time 0, and where the memory belongs to another grid than that with the number
+    ``form``, the ground becomes undisturbed."""
     passed = time - memory.head[TIME]
-    if (time == 0.0 and passed != 0.0) or memory.head[
-        FORM
-    ] != form:  # a rollout leaves userdata as they are
-        for numbers in (memory.levels, memory.carried, memory.visits):
-            numbers[:] = 0.0
-        for cells in (
-            memory.boxes,
-            memory.ground,
-            memory.pressed,
-            memory.marks,
-            memory.owners,
-            memory.floors,
-        ):
-            cells[:] = 0.0
-        memory.head[:] = 0.0
+    # A rollout begins anew at time 0, and leaves userdata as they are.
+    begins_anew = time == 0.0 and passed != 0.0
+    if begins_anew or memory.head[FORM] != form:
+        clear(memory)
         memory.head[FORM] = form
         passed = time
     if passed == 0.0:
         return -1.0
     memory.head[TIME] = time
     memory.head[STAMP] += 1.0
-    if memory.head[STAMP] % EVERY == 0.0:
+    if memory.head[STAMP] % TOP_INTERVAL == 0.0:
         memory.head[TOP] = max(memory.ground.max(), 0.0)
     return min(max(passed, 0.0), 1.0)
+
+
+def clear(memory) -> None:
+    """Make the ground undisturbed."""
+    memory.head[:] = 0.0
+    memory.levels[:] = 0.0
+    memory.carried[:] = 0.0
+    memory.visits[:] = 0.0
+    memory.boxes[:] = 0.0
+    memory.ground[:] = 0.0
+    memory.pressed[:] = 0.0
+    memory.marks[:] = 0.0
+    memory.owners[:] = 0.0
+    memory.floors[:] = 0.0
 
 
 def remember(memory, time, prints, bodies, poses, slopes) -> None:
     """Take a step of all geoms, unless the memory has it already.
 
-    prints: grid, (6,), undisturbed heights (R, C), points (P, 3) on the geoms and the first of each geom, (G + 1,). bodies:
-    numbers (G, 4) of geoms, bodies and roots, and spheres (G, 4) as of `rft.mujoco.bed.Bed`. poses: arrays of
-    `rft.mujoco.addresses.Arrays`. slopes: grid and frame of hills, (0, 0, 3) for none, and up and level."""
+    prints: grid, (6,), undisturbed heights (R, C), points (P, 3) on the geoms and the
+    first of each geom, (G + 1,). bodies: numbers (G, 3) of geoms, bodies and roots, and
+    spheres (G, 4) as of `rft.mujoco.bed.BedGeoms`. poses: arrays of
+    `rft.mujoco.addresses.Arrays`. slopes: grid and frame of hills, (0, 0, 3) for none,
+    and up and level."""
     grid, surface, points, first = prints
     numbers, spheres = bodies
     xpos, xmat, cvel, com = poses
@@ -215,66 +240,70 @@ def remember(memory, time, prints, bodies, poses, slopes) -> None:
     if passed < 0.0:
         return
     for k in range(len(numbers)):
-        turn, place = xmat[numbers[k, 0]], xpos[numbers[k, 0]]
-        center, radius = spheres[k, :3], spheres[k, 3]
-        x = (
-            place[0]
-            + turn[0, 0] * center[0]
-            + turn[0, 1] * center[1]
-            + turn[0, 2] * center[2]
-        )
-        y = (
-            place[1]
-            + turn[1, 0] * center[0]
-            + turn[1, 1] * center[1]
-            + turn[1, 2] * center[2]
-        )
-        z = (
-            place[2]
-            + turn[2, 0] * center[0]
-            + turn[2, 1] * center[1]
-            + turn[2, 2] * center[2]
-        )
+        turn = xmat[numbers[k, 0]]
+        place = xpos[numbers[k, 0]]
+        x, y, z = to_world(turn, place, spheres[k])
         if hills.shape[0] > 0:
             up, level = tangent_plane(hills, frame, x, y)
         memory.boxes[k] = 0.0
         if memory.visits[k] == 0.0:
-            leave(memory, k)
-        if (up[0] * x + up[1] * y + up[2] * z - level - radius) / up[2] < memory.head[
-            TOP
-        ]:
-            press(
-                memory, grid, k, points[first[k] : first[k + 1]], turn, place, up, level
-            )
+            begin_visit(memory, k)
+        height = up[0] * x + up[1] * y + up[2] * z - level
+        lowest = (height - spheres[k, 3]) / up[2]
+        if lowest < memory.head[TOP]:
+            own_points = points[first[k] : first[k + 1]]
+            press(memory, grid, k, own_points, turn, place, up, level)
         else:
             memory.levels[k] = 0.0
-            leave(memory, k)
-    release(memory)
+            begin_visit(memory, k)
+    lower_vacated_cells(memory)
     for k in range(len(numbers)):
-        geom, body, root = numbers[k, 0], numbers[k, 1], numbers[k, 2]
-        r_x, r_y, r_z = (
-            xpos[geom, 0] - com[root, 0],
-            xpos[geom, 1] - com[root, 1],
-            xpos[geom, 2] - com[root, 2],
-        )
-        v_x = cvel[body, 3] + cvel[body, 1] * r_z - cvel[body, 2] * r_y
-        v_y = cvel[body, 4] + cvel[body, 2] * r_x - cvel[body, 0] * r_z
-        v_z = cvel[body, 5] + cvel[body, 0] * r_y - cvel[body, 1] * r_x
+        arm = xpos[numbers[k, 0]] - com[numbers[k, 2]]
+        v_x, v_y, v_z = velocity_at(cvel[numbers[k, 1]], arm)
         heap(memory, k, v_x, v_y, v_z)
     slide(memory, grid, surface, passed)
 
 
+def to_world(turn, place, point) -> tuple[float, float, float]:
+    """Return the place x, y, z, m, in the world of a point in the frame of a geom."""
+    a, b, c = point[0], point[1], point[2]
+    x = place[0] + turn[0, 0] * a + turn[0, 1] * b + turn[0, 2] * c
+    y = place[1] + turn[1, 0] * a + turn[1, 1] * b + turn[1, 2] * c
+    z = place[2] + turn[2, 0] * a + turn[2, 1] * b + turn[2, 2] * c
+    return x, y, z
+
+
+def velocity_at(twist, arm) -> tuple[float, float, float]:
+    """Return the velocity, m/s, at an arm (3,), m, from the point of a twist (6,),
+    rotation first."""
+    v_x = twist[3] + twist[1] * arm[2] - twist[2] * arm[1]
+    v_y = twist[4] + twist[2] * arm[0] - twist[0] * arm[2]
+    v_z = twist[5] + twist[0] * arm[1] - twist[1] * arm[0]
+    return v_x, v_y, v_z
+
+
 def press(memory, grid, k, points, turn, place, up, level) -> None:
-    """Press the cells that geom k is in, and set its level. points: (P, 3), on its surface in its frame, m. The surface is
-    undisturbed at up . x = level."""
+    """Press the cells that geom k is in, and set its level.
+
+    points: (P, 3), on its surface in its frame, m. The surface is undisturbed at up . x
+    = level."""
     rows, columns = memory.ground.shape
-    stamp, size, visit = memory.head[STAMP], grid[2], memory.visits[k]
-    total, count, outside = 0.0, 0, 0
-    bottom, least, beneath, top = 1e30, 1e30, 0.0, memory.head[TOP]
+    stamp = memory.head[STAMP]
+    visit = memory.visits[k]
+    top = memory.head[TOP]
+    size = grid[2]
+    total = 0.0
+    count = 0
+    outside = 0
+    bottom = 1e30
+    least = 1e30
+    beneath = 0.0
     height = (up[0] * place[0] + up[1] * place[1] + up[2] * place[2] - level) / up[2]
     u_x = (up[0] * turn[0, 0] + up[1] * turn[1, 0] + up[2] * turn[2, 0]) / up[2]
     u_y = (up[0] * turn[0, 1] + up[1] * turn[1, 1] + up[2] * turn[2, 1]) / up[2]
     u_z = (up[0] * turn[0, 2] + up[1] * turn[1, 2] + up[2] * turn[2, 2]) / up[2]
+    # The first sweep finds the level; the second presses, where the geom is partly in
+    # the ground.
     for sweep in range(2):
         if sweep == 1 and (count == 0 or outside == 0):
             break
@@ -286,55 +315,68 @@ def press(memory, grid, k, points, turn, place, up, level) -> None:
                 continue
             x = place[0] + turn[0, 0] * a + turn[0, 1] * b + turn[0, 2] * c
             y = place[1] + turn[1, 0] * a + turn[1, 1] * b + turn[1, 2] * c
-            i, j = math.floor((y - grid[1]) / size), math.floor((x - grid[0]) / size)
+            i = math.floor((y - grid[1]) / size)
+            j = math.floor((x - grid[0]) / size)
             inside = 0 <= i < rows and 0 <= j < columns
             ground = memory.ground[i, j] if inside else 0.0
             if sweep == 0 and inside and memory.owners[i, j] == visit:
+                # Its own heap does not count.
                 ground = min(ground, memory.floors[i, j])
             above = z - ground
             if sweep == 0:
                 bottom = min(bottom, z)
                 if above < least:
-                    least, beneath = above, ground
+                    least = above
+                    beneath = ground
                 if above < 0.0:
                     total += ground
                     count += 1
                 else:
                     outside += 1
             elif inside and above < 0.0:
-                if memory.marks[i, j] != stamp:
-                    memory.marks[i, j] = stamp
-                    extend(memory.boxes[k], i, j, 0, rows, columns)
-                if above < memory.pressed[i, j]:
-                    memory.carried[k] += memory.pressed[i, j] - above
-                    memory.pressed[i, j] = above
-    memory.levels[k] = total / count if count > 0 else min(beneath, bottom)
-    if count == 0:
-        leave(memory, k)
+                press_cell(memory, k, i, j, above, stamp)
+    if count > 0:
+        memory.levels[k] = total / count
+    else:
+        memory.levels[k] = min(beneath, bottom)
+        begin_visit(memory, k)
 
 
-def leave(memory, k) -> None:
-    """Let geom k be out of the ground: what it heaps up later it has not heaped up yet."""
+def press_cell(memory, k, i, j, above, stamp) -> None:
+    """Press a cell down to a point of geom k, which is ``above`` < 0, m, from its
+    ground."""
+    rows, columns = memory.ground.shape
+    if memory.marks[i, j] != stamp:
+        memory.marks[i, j] = stamp
+        extend_box(memory.boxes[k], i, j, 0, rows, columns)
+    if above < memory.pressed[i, j]:
+        memory.carried[k] += memory.pressed[i, j] - above
+        memory.pressed[i, j] = above
+
+
+def begin_visit(memory, k) -> None:
+    """Give geom k, which is out of the ground, the number of its next visit: earlier
+    heaps are no longer its own."""
     memory.visits[k] = memory.head[STAMP] * len(memory.visits) + k + 1.0
 
 
-def extend(box, i, j, margin, rows, columns) -> None:
-    """Let a box of cells hold a cell and its neighbours within a margin."""
+def extend_box(box, i, j, margin, rows, columns) -> None:
+    """Extend a box of cells to a cell and its neighbours within a margin."""
     if box[1] <= box[0]:
-        box[0], box[1], box[2], box[3] = rows, 0.0, columns, 0.0
-    box[0], box[1] = (
-        min(box[0], max(i - margin, 0)),
-        max(box[1], min(i + margin + 1, rows)),
-    )
-    box[2], box[3] = (
-        min(box[2], max(j - margin, 0)),
-        max(box[3], min(j + margin + 1, columns)),
-    )
+        box[0] = rows
+        box[1] = 0.0
+        box[2] = columns
+        box[3] = 0.0
+    box[0] = min(box[0], max(i - margin, 0))
+    box[1] = max(box[1], min(i + margin + 1, rows))
+    box[2] = min(box[2], max(j - margin, 0))
+    box[3] = max(box[3], min(j + margin + 1, columns))
 
 
-def release(memory) -> None:
+def lower_vacated_cells(memory) -> None:
     """Lower the cells that geoms have left."""
-    box, stamp = memory.head[BOX : BOX + 4], memory.head[STAMP]
+    box = memory.head[BOX : BOX + 4]
+    stamp = memory.head[STAMP]
     for i in range(int(box[0]), int(box[1])):
         for j in range(int(box[2]), int(box[3])):
             if memory.pressed[i, j] < 0.0 and memory.marks[i, j] != stamp:
@@ -343,50 +385,55 @@ def release(memory) -> None:
 
 
 def heap(memory, k, v_x, v_y, v_z) -> None:
-    """Heap what geom k has pressed away on the cells around it. v_x, v_y, v_z: its velocity, m/s."""
+    """Heap what geom k has pressed away on the cells around it. v_x, v_y, v_z: its
+    velocity, m/s."""
     rows, columns = memory.ground.shape
-    box, stamp = memory.boxes[k], memory.head[STAMP]
+    box = memory.boxes[k]
+    stamp = memory.head[STAMP]
     if box[1] <= box[0]:
         return
     active = memory.head[BOX : BOX + 4]
-    extend(active, int(box[0]), int(box[2]), RIM + 1, rows, columns)
-    extend(active, int(box[1]) - 1, int(box[3]) - 1, RIM + 1, rows, columns)
+    extend_box(active, int(box[0]), int(box[2]), RIM + 1, rows, columns)
+    extend_box(active, int(box[1]) - 1, int(box[3]) - 1, RIM + 1, rows, columns)
     if memory.carried[k] == 0.0:
         return
-    middle_i, middle_j, total = (
-        0.5 * (box[0] + box[1] - 1.0),
-        0.5 * (box[2] + box[3] - 1.0),
-        0.0,
-    )
+    middle_i = 0.5 * (box[0] + box[1] - 1.0)
+    middle_j = 0.5 * (box[2] + box[3] - 1.0)
+    total = 0.0
+    # The first sweep sums the weights of the cells, the second heaps.
     for sweep in range(2):
         if sweep == 1 and total == 0.0:
             return
         for i in range(max(int(box[0]) - RIM, 0), min(int(box[1]) + RIM, rows)):
             for j in range(max(int(box[2]) - RIM, 0), min(int(box[3]) + RIM, columns)):
-                if memory.pressed[i, j] < 0.0 or not beside(memory.marks, stamp, i, j):
+                if memory.pressed[i, j] < 0.0:
                     continue
-                d_i, d_j = i - middle_i, j - middle_j
-                ahead = (d_j * v_x + d_i * v_y) / max(
-                    math.sqrt(d_i * d_i + d_j * d_j), 1e-9
-                )
-                weight = max(ahead, 0.0) + max(-v_z, 0.0) + 1e-9
+                if not near_rim(memory.marks, stamp, i, j):
+                    continue
+                d_i = i - middle_i
+                d_j = j - middle_j
+                distance = max(math.sqrt(d_i * d_i + d_j * d_j), 1e-9)
+                speed_towards = (d_j * v_x + d_i * v_y) / distance
+                weight = max(speed_towards, 0.0) + max(-v_z, 0.0) + 1e-9
                 if sweep == 0:
                     total += weight
                 else:
-                    own(memory, i, j, memory.visits[k])
+                    set_owner(memory, i, j, memory.visits[k])
                     memory.ground[i, j] += memory.carried[k] * weight / total
                     memory.head[TOP] = max(memory.head[TOP], memory.ground[i, j])
     memory.carried[k] = 0.0
 
 
-def own(memory, i, j, visit) -> None:
-    """Let a cell be heaped up in a visit from now on."""
+def set_owner(memory, i, j, visit) -> None:
+    """Note that a cell is heaped up in a visit from now on."""
     if memory.owners[i, j] != visit:
-        memory.owners[i, j], memory.floors[i, j] = visit, memory.ground[i, j]
+        memory.owners[i, j] = visit
+        memory.floors[i, j] = memory.ground[i, j]
 
 
-def beside(marks, stamp, i, j) -> bool:
-    """Return whether a geom is within `RIM` cells of a cell, and in the cell itself none."""
+def near_rim(marks, stamp, i, j) -> bool:
+    """Return whether a geom is within `RIM` cells of a cell, and none in the cell
+    itself."""
     rows, columns = marks.shape
     if marks[i, j] == stamp:
         return False
@@ -398,48 +445,67 @@ def beside(marks, stamp, i, j) -> bool:
 
 
 def slide(memory, grid, surface, passed) -> None:
-    """Let ground that is steeper than the angle of repose slide for a time, s. surface: (R, C), undisturbed heights, m."""
+    """Let ground that is steeper than the angle of repose slide for a time, s. surface:
+    (R, C), undisturbed heights, m."""
     rows, columns = memory.ground.shape
-    ground, pressed, owners = memory.ground, memory.pressed, memory.owners
-    share, order = min(SHARE, passed / grid[4]), memory.head[STAMP] % 4.0
+    ground = memory.ground
+    pressed = memory.pressed
+    share = min(MAX_SHARE, passed / grid[4])
+    order = memory.head[STAMP] % 4.0
     box = memory.head[BOX : BOX + 4]
     i_0, i_1, j_0, j_1 = int(box[0]), int(box[1]), int(box[2]), int(box[3])
     box[:] = 0.0
     for a in range(i_1 - i_0):
+        # Steps take turns in the order of cells, so that no direction is preferred.
         i = i_1 - 1 - a if order % 2.0 == 1.0 else i_0 + a
         for b in range(j_1 - j_0):
             j = j_1 - 1 - b if order >= 2.0 else j_0 + b
             if pressed[i, j] < 0.0:
-                extend(box, i, j, 1, rows, columns)
+                extend_box(box, i, j, 1, rows, columns)
                 continue
-            for n in range(4):  # the neighbours ahead; those behind have this one ahead
-                m, o = i + (n > 0), j + (1 if n < 2 else 2 - n)
+            # The four neighbours ahead; those behind have this one ahead.
+            for n in range(4):
+                m = i if n == 0 else i + 1
+                o = j + 1 if n < 2 else j + 2 - n
                 if m >= rows or o >= columns or o < 0 or pressed[m, o] < 0.0:
                     continue
                 drop = surface[i, j] + ground[i, j] - surface[m, o] - ground[m, o]
-                limit = grid[3] * grid[2] * (1.4142135623730951 if n % 2 == 1 else 1.0)
+                limit = grid[3] * grid[2] * (DIAGONAL if n % 2 == 1 else 1.0)
                 excess = abs(drop) - limit
                 if excess > STEEPER * limit:
-                    moved = share * excess if drop > 0.0 else -share * excess
-                    if drop > 0.0 and owners[i, j] > owners[m, o]:
-                        own(memory, m, o, owners[i, j])
-                    elif drop < 0.0 and owners[m, o] > owners[i, j]:
-                        own(memory, i, j, owners[m, o])
-                    ground[i, j] -= moved
-                    ground[m, o] += moved
-                    extend(box, i, j, 2, rows, columns)
+                    volume = share * excess if drop > 0.0 else -share * excess
+                    shift_ground(memory, i, j, m, o, volume)
+                    extend_box(box, i, j, 2, rows, columns)
+
+
+def shift_ground(memory, i, j, m, o, volume) -> None:
+    """Move ground from the cell (i, j) to its neighbour (m, o), or back where the
+    volume, m, over the area of a cell, is negative."""
+    owners = memory.owners
+    # The cell that receives ground belongs to the later visit.
+    if volume > 0.0 and owners[i, j] > owners[m, o]:
+        set_owner(memory, m, o, owners[i, j])
+    elif volume < 0.0 and owners[m, o] > owners[i, j]:
+        set_owner(memory, i, j, owners[m, o])
+    memory.ground[i, j] -= volume
+    memory.ground[m, o] += volume
 
 
 COMPILED = (
     memory_of,
     remember,
     begin_step,
+    clear,
+    to_world,
+    velocity_at,
     press,
-    leave,
-    extend,
-    release,
+    press_cell,
+    begin_visit,
+    extend_box,
+    lower_vacated_cells,
     heap,
-    own,
-    beside,
+    set_owner,
+    near_rim,
     slide,
+    shift_ground,
 )

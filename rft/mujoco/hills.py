@@ -73,8 +73,8 @@ def tangent_plane(
 
 
 def _between_nodes(grid, quantity, i, j, s, t) -> float:
-    """Return a quantity of a grid at fractions s and t of the cell between the nodes (i,
-    j) and (i + 1, j + 1)."""
+    """Return a quantity of a grid at fractions s and t of the cell between the nodes
+    (i, j) and (i + 1, j + 1)."""
     return (
         (1 - s) * (1 - t) * grid[i, j, quantity]
         + (1 - s) * t * grid[i, j + 1, quantity]

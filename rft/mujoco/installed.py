@@ -22,7 +22,7 @@ import numpy as np
 from rft.balance.backend import Note, compiles
 from rft.core.refusal import require
 from rft.mujoco import numpy_step
-from rft.mujoco.addresses import check_places, functions, places, takes_data
+from rft.mujoco.addresses import check_places, full_m_takes_data, functions, places
 from rft.mujoco.bed import Bed
 from rft.mujoco.footprints import Prints
 from rft.mujoco.implicit import ACCURACY, COARSER, UNSOLVED, Result
@@ -361,8 +361,8 @@ def _warn_unsolved(time: float, residual: float, geom: str) -> None:
     """Warn about a step that is not solved."""
     line = (
         f"the step at {time:.6g} s is not solved: the forces, of which the grains'"
-        f" on {geom} are the largest, miss balance by {100 * residual:.2g} %; sand.effort"
-        " counts such steps, shorter ones are easier"
+        f" on {geom} are the largest, miss balance by {100 * residual:.2g} %;"
+        " sand.effort counts such steps, shorter ones are easier"
     )
     warnings.warn(line, Note, stacklevel=2)
 
@@ -467,7 +467,7 @@ def _model_numbers(parts: ModelParts) -> dict[str, int]:
         "geom_size": parts.geom_size,
         "geom_type": parts.geom_type,
         "geom_dataid": parts.geom_dataid,
-        "full_takes_data": takes_data(),
+        "full_takes_data": full_m_takes_data(),
         "no_euler_damping": int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP),
     }
 

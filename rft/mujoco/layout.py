@@ -1,4 +1,5 @@
-"""Names of the numbers that compiled code reads of a bed, in the order in which they stand in its `Layout`.
+"""Names of the numbers that compiled code reads of a bed, in the order in which they
+stand in its `Layout`.
 
 `rft.mujoco.installed` writes them, `rft.mujoco.compiled` reads them by ``AT.name``."""
 
@@ -15,20 +16,22 @@ COUNTED = ("n_zones", "n_planes", "n_numbers")
 OWN = (
     "table", "row_spheres", "first", "geoms", "spheres", "dofs", "first_dof", "bodies",
     "parents", "trees",
-    "laws", "ground", "disturbed", "surface", "hills", "hill_frame", "planes", "first_plane",
-    "derivative_rows", "derivative_columns", "shapes", "counts", "largest", "watch", "watched", "unsolved",
+    "laws", "ground", "disturbed", "surface", "hills", "hill_frame", "planes",
+    "first_plane",
+    "derivative_rows", "derivative_columns", "shapes", "counts", "largest", "watch",
+    "watched", "unsolved",
 )  # fmt: skip
 MODEL = (
-    "model", "timestep", "integrator", "disableflags", "damping", "geom_size", "geom_type",
-    "geom_dataid",
+    "model", "timestep", "integrator", "disableflags", "damping", "geom_size",
+    "geom_type", "geom_dataid",
 )  # fmt: skip
 FLAGS = (
     "is_sparse", "full_takes_data", "no_euler_damping", "report",
     "report_changed", "element_code", "solver_code",
 )  # fmt: skip
 PRINTS = (
-    "recorder", "memory_start", "print_rows", "print_columns", "print_grid", "print_surface",
-    "print_points", "print_first",
+    "recorder", "memory_start", "print_rows", "print_columns", "print_grid",
+    "print_surface", "print_points", "print_first",
 )  # fmt: skip
 IN_DATA = (
     *ARRAYS, "time", *COUNTS, *(f"contact_{name}" for name in Contacts._fields),

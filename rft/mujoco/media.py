@@ -29,8 +29,8 @@ MAX_DRAWS = 100
 
 
 def law_of(medium: object) -> Extruded | Spatial:
-    """Return the law of three dimensions of a medium; Refusal for one without a vertical
-    law."""
+    """Return the law of three dimensions of a medium; Refusal for one without a
+    vertical law."""
     if isinstance(medium, str):
         _require_vertical(medium)
         return Extruded(VERTICAL[medium].stress)
@@ -183,7 +183,8 @@ def with_medium(bed: Bed, medium: Any) -> Bed:
         count = len(bed.laws)
         require(
             len(medium) == count,
-            f"media of a simulation must be {count}, the medium and one for each region",
+            f"media of a simulation must be {count}, the medium and one for each"
+            " region",
         )
         base, *regions = map(law_of, medium)
     else:

@@ -1,4 +1,5 @@
-"""What the equations of a step take from a model: fixed numbers, and addresses of those that a user may change."""
+"""What the equations of a step take from a model: fixed numbers, and addresses of those
+that a user may change."""
 
 from __future__ import annotations
 
@@ -12,10 +13,12 @@ from rft.mujoco.addresses import options_of, sizes_of, time_step
 
 
 class ModelParts(NamedTuple):
-    """Parts of a model, without a reference to it. address: of the model. sizes: `sizes_of`, and whether matrices are
-    sparse. bodies: (nbody, 2), the last degree of freedom that moves each body, -1 for none, and its root. parents, trees:
-    (nv,), of each degree of freedom. derivative_rows, derivative_columns: (nD,), of qDeriv. timestep, integrator,
-    disableflags, damping, geom_size, geom_type, geom_dataid: addresses in the model's own memory."""
+    """Parts of a model, without a reference to it. address: of the model. sizes:
+    `sizes_of`, and whether matrices are sparse. bodies: (nbody, 2), the last degree of
+    freedom that moves each body, -1 for none, and its root. parents, trees: (nv,), of
+    each degree of freedom. derivative_rows, derivative_columns: (nD,), of qDeriv.
+    timestep, integrator, disableflags, damping, geom_size, geom_type, geom_dataid:
+    addresses in the model's own memory."""
 
     address: int
     sizes: dict[str, int]
@@ -58,7 +61,8 @@ class ModelParts(NamedTuple):
         )
 
     def shape_numbers(self, geoms: np.ndarray) -> np.ndarray:
-        """Return the numbers that the elements of geoms follow from, as they are now, (G, 5)."""
+        """Return the numbers that the elements of geoms follow from, as they are now,
+        (G, 5)."""
         count = self.sizes["ngeom"]
         sizes = (ctypes.c_double * (3 * count)).from_address(self.geom_size)
         kinds = (ctypes.c_int32 * count).from_address(self.geom_type)
@@ -69,7 +73,8 @@ class ModelParts(NamedTuple):
 
 
 def last_dof(model: mujoco.MjModel, body: int) -> int:
-    """Return the last degree of freedom that moves a body, its own or that of the body it is welded to; -1 for none."""
+    """Return the last degree of freedom that moves a body, its own or that of the body
+    it is welded to; -1 for none."""
     while body and not model.body_dofnum[body]:
         body = model.body_parentid[body]
     if not body:

@@ -1,4 +1,5 @@
-"""The forces of the grains in a step by NumPy, at the address of an mjData, as `rft.mujoco.compiled` computes them."""
+"""The forces of the grains in a step by NumPy, at the address of an mjData, as
+`rft.mujoco.compiled` computes them."""
 
 from __future__ import annotations
 
@@ -7,7 +8,7 @@ import ctypes
 import mujoco
 import numpy as np
 
-from rft.mujoco.addresses import Arrays, functions, takes_data
+from rft.mujoco.addresses import Arrays, full_m_takes_data, functions
 from rft.mujoco.bed import Bed
 from rft.mujoco.equations import (
     FASTEST,
@@ -31,7 +32,8 @@ POINTER = ctypes.c_void_p
 def add_forces(bed: Bed, parts: ModelParts, data: int):
     """Add the forces of the grains to qfrc_passive of the mjData at an address.
 
-    Returns (result, geom, wrenches, twists) of `rft.mujoco.equations.solve_blocks`; None where no geom is in the ground."""
+    Returns (result, geom, wrenches, twists) of `rft.mujoco.equations.solve_blocks`;
+    None where no geom is in the ground."""
     arrays = Arrays(data, parts.sizes)
     frames = bed.frames(arrays)
     velocity = arrays.qvel
@@ -65,7 +67,7 @@ def _inputs(bed, parts, data: int, arrays: Arrays, frames, in_ground) -> Inputs:
     integrator = _integer(parts.integrator)
     step = ctypes.c_double.from_address(parts.timestep).value
     step = step / 2 if integrator == RUNGE_KUTTA else step
-    force = _known_force(parts, data, arrays)
+    force = _force_without_grains(parts, data, arrays)
     inertia = _inertia(parts, data, arrays)
     effective = inertia.copy()
     is_damped = _add_implicit_terms(parts, data, arrays, integrator, effective, step)
@@ -98,7 +100,7 @@ def _integer(address: int) -> int:
     return ctypes.c_int32.from_address(address).value
 
 
-def _known_force(parts: ModelParts, data: int, arrays: Arrays) -> np.ndarray:
+def _force_without_grains(parts: ModelParts, data: int, arrays: Arrays) -> np.ndarray:
     """Return all smooth forces (nv,) of this step but those of the grains."""
     bias = np.zeros(parts.sizes["nv"])
     _call("mj_rne", parts.address, data, np.int32(0), bias.ctypes.data)
@@ -122,7 +124,7 @@ def _inertia(parts: ModelParts, data: int, arrays: Arrays) -> np.ndarray:
     """Return the inertia (nv, nv)."""
     nv = parts.sizes["nv"]
     matrix = np.zeros((nv, nv))
-    if takes_data():
+    if full_m_takes_data():
         _call("mj_fullM", parts.address, data, matrix.ctypes.data)
     else:
         _call("mj_fullM", parts.address, matrix.ctypes.data, arrays.qM.ctypes.data)
@@ -130,7 +132,8 @@ def _inertia(parts: ModelParts, data: int, arrays: Arrays) -> np.ndarray:
 
 
 def _add_implicit_terms(parts, data, arrays, integrator, effective, step) -> bool:
-    """Add what the integrator takes implicitly to the inertia, and return whether there is any."""
+    """Add what the integrator takes implicitly to the inertia, and return whether there
+    is any."""
     if integrator in (IMPLICIT, IMPLICIT_FAST):
         with_bias = np.int32(integrator == IMPLICIT)
         _call("mjd_smooth_vel", parts.address, data, with_bias)
@@ -152,7 +155,8 @@ def _add_implicit_terms(parts, data, arrays, integrator, effective, step) -> boo
 
 
 def _jacobians(bed: Bed, arrays: Arrays, frames, in_ground) -> np.ndarray:
-    """Return the Jacobians (G, 6, nv) of the geoms in the ground along their own axes."""
+    """Return the Jacobians (G, 6, nv) of the geoms in the ground along their own
+    axes."""
     arm = frames.place - arrays.subtree_com[bed.geoms.roots]
     spin, speed = arrays.cdof[None, :, :3], arrays.cdof[None, :, 3:]
     speed = speed + np.cross(spin, arm[:, None])

@@ -1,8 +1,10 @@
-"""The parts of elements below the surface, cut once a step, and their loads by the velocities of their geoms.
+"""The parts of elements below the surface, cut once a step, and their loads by the
+velocities of their geoms.
 
-By NumPy; `rft.mujoco.compiled_parts` defines `loads`, `loads_with_slopes` and `add_dampers` a second time for compiled
-code, eight elements at once. Wrenches are forces and moments about the origins of geoms along the geoms' axes, twists
-velocities and angular velocities there."""
+By NumPy; `rft.mujoco.compiled_parts` defines `write_wrenches`, `write_slopes` and
+`add_dampers` a second time for compiled code, eight elements at once. Wrenches are
+forces and moments about the origins of geoms along the geoms' axes, twists velocities
+and angular velocities there."""
 
 from __future__ import annotations
 
@@ -26,8 +28,9 @@ from rft.terradynamics.meshes.zones import Place, Zones, share_in, share_of_part
 
 
 class Frames(NamedTuple):
-    """Where geoms are. up, ahead: (G, 3), directions along their axes. x, height: (G,), of their origins, m. turn: (G, 3,
-    3), from their axes to the world. place: (G, 3), m."""
+    """Where geoms are. up, ahead: (G, 3), directions along their axes. x, height: (G,),
+    of their origins, m. turn: (G, 3, 3), from their axes to the world. place: (G, 3),
+    m."""
 
     up: np.ndarray
     ahead: np.ndarray
@@ -38,8 +41,8 @@ class Frames(NamedTuple):
 
 
 class Zone(NamedTuple):
-    """The parts (T,) in one zone of the ground: its law and state, the parts, the geom of each, whether they are of sheets,
-    and up, x and ahead of their geoms."""
+    """The parts (T,) in one zone of the ground: its law and state, the parts, the geom
+    of each, whether they are of sheets, and up, x and ahead of their geoms."""
 
     law: Spatial
     ground: Ground
@@ -57,11 +60,11 @@ class Grains(NamedTuple):
 
 def cut(blocks: Blocks, laws, zones: Zones, ground: Ground, frames: Frames) -> Grains:
     """Return the parts of all elements below the surface."""
-    motion = _resting(frames, blocks.owner)
+    motion = _motion_at_rest(frames, blocks.owner)
     under = np.flatnonzero(np.min(corner_heights(blocks.faces, motion), 0) < 0.0)
     owner = blocks.owner[under]
     face = type(blocks.faces)(*(x[under] for x in blocks.faces))
-    motion = _resting(frames, owner)
+    motion = _motion_at_rest(frames, owner)
     part = part_below(face, corner_heights(face, motion))
     if len(laws) == 1:
         shares = [None]
@@ -83,14 +86,14 @@ def cut(blocks: Blocks, laws, zones: Zones, ground: Ground, frames: Frames) -> G
     )
 
 
-def _resting(frames: Frames, owner: np.ndarray) -> Motion:
+def _motion_at_rest(frames: Frames, owner: np.ndarray) -> Motion:
     """Return where the geoms of elements are, as a motion without velocity."""
     rest = (0.0, 0.0, 0.0)
     up, ahead = tuple(frames.up[owner].T), tuple(frames.ahead[owner].T)
     return Motion(rest, rest, frames.x[owner], up, ahead, frames.height[owner])
 
 
-def _moving(zone: Zone, rounding: float, twists: np.ndarray):
+def _motion_of_parts(zone: Zone, rounding: float, twists: np.ndarray):
     """Return the ground at a rounding, and the velocities of the middles of parts."""
     own = twists[zone.owner].T
     motion = zone.motion._replace(velocity=tuple(own[:3]), spin=tuple(own[3:]))
@@ -99,7 +102,8 @@ def _moving(zone: Zone, rounding: float, twists: np.ndarray):
 
 
 def _add_by_owner(out: np.ndarray, owner: np.ndarray, values) -> None:
-    """Add values (..., T) of parts to those of their geoms (G, ...). owner: (T,), geom after geom."""
+    """Add values (..., T) of parts to those of their geoms (G, ...). owner: (T,), geom
+    after geom."""
     if not len(owner):
         return
     begin = np.flatnonzero(np.diff(owner, prepend=-1))
@@ -107,20 +111,21 @@ def _add_by_owner(out: np.ndarray, owner: np.ndarray, values) -> None:
     out[owner[begin]] += np.moveaxis(sums, -1, 0)
 
 
-def loads(grains, members, rounding, twists, wrenches) -> None:
-    """Write the wrenches (G, 6) on geoms that move with twists (G, 6). members: (m,), geoms that are computed."""
+def write_wrenches(grains, members, rounding, twists, wrenches) -> None:
+    """Write the wrenches (G, 6) on geoms that move with twists (G, 6). members: (m,),
+    geoms that are computed."""
     wrenches[:] = 0.0
     for zone in grains.zones:
-        ground, motion, v = _moving(zone, rounding, twists)
+        ground, motion, v = _motion_of_parts(zone, rounding, twists)
         f, m, _ = load(zone.law, ground, zone.part, motion, v, zone.sheet)
         _add_by_owner(wrenches, zone.owner, f + m)
 
 
-def loads_with_slopes(grains, members, rounding, twists, slopes) -> None:
+def write_slopes(grains, members, rounding, twists, slopes) -> None:
     """Write the slopes (G, 6, 6) of the wrenches by the twists."""
     slopes[:] = 0.0
     for zone in grains.zones:
-        ground, motion, v = _moving(zone, rounding, twists)
+        ground, motion, v = _motion_of_parts(zone, rounding, twists)
         _, _, by_v, moment_by_v = load_with_slopes(
             zone.law, ground, zone.part, motion, v, zone.sheet
         )
@@ -134,9 +139,10 @@ def loads_with_slopes(grains, members, rounding, twists, slopes) -> None:
 
 
 def add_dampers(grains, members, rounding, twists, dampers) -> None:
-    """Add the slopes (G, 6, 6) of dampers that bear as much as the elements at their speeds."""
+    """Add the slopes (G, 6, 6) of dampers that bear as much as the elements at their
+    speeds."""
     for zone in grains.zones:
-        ground, motion, v = _moving(zone, rounding, twists)
+        ground, motion, v = _motion_of_parts(zone, rounding, twists)
         f, _, _ = load(zone.law, ground, zone.part, motion, v, zone.sheet)
         f, v = np.stack(np.broadcast_arrays(*f)), np.stack(v)
         size = np.sqrt((f**2).sum(0) / ((v**2).sum(0) + rounding**2))

@@ -52,8 +52,8 @@ def parse_zones(regions: Mapping[str, Any]) -> Zones:
 
 
 def parse_planes(text: str) -> list[Linear]:
-    """Return a, b and c of the planes within which a condition holds, a x + b y > c with
-    a^2 + b^2 = 1."""
+    """Return a, b and c of the planes within which a condition holds, a x + b y > c
+    with a^2 + b^2 = 1."""
     fault = f"the region {formatted(text)} is no condition on x and y"
     try:
         pairs = _pairs_of_sides(text)
@@ -116,8 +116,8 @@ def _linear(node: Any) -> Linear:
 
 
 def _combined(operator: ast.operator, left: Linear, right: Linear) -> Linear:
-    """Return a sum, a difference, or a product or quotient with a number; ValueError for
-    other operators."""
+    """Return a sum, a difference, or a product or quotient with a number; ValueError
+    for other operators."""
     match operator:
         case ast.Add():
             return _sum(left, right)

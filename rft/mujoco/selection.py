@@ -70,8 +70,8 @@ def _movable_solids(model: mujoco.MjModel) -> list[int]:
 def _split_by_touch(
     model: mujoco.MjModel, geoms: list[int]
 ) -> tuple[list[int], list[int]]:
-    """Return the geoms that can touch others, and the rest; all of them, and none, where
-    none can."""
+    """Return the geoms that can touch others, and the rest; all of them, and none,
+    where none can."""
     touching = [g for g in geoms if can_touch(model, g)]
     if not touching:
         return geoms, []

@@ -1,7 +1,8 @@
 """How deep geoms sink under their weight.
 
-A body at rest creeps because the stress is rounded. Where the grains bear F(z) when it moves straight down fast, it sinks
-at the speed v at which F(z) v / sqrt(v^2 + e^2) is its weight, ever more slowly.
+A body at rest creeps because the stress is rounded. Where the grains bear F(z) when it
+moves straight down fast, it sinks at the speed v at which F(z) v / sqrt(v^2 + e^2) is
+its weight, ever more slowly.
 """
 
 from __future__ import annotations
