@@ -79,7 +79,7 @@ def test_the_truth_has_exact_integrals_whatever_rule_the_scene_takes():
     ruled = scenes.load("three-link-glass").with_numerics(
         loads="midpoint:3", regularisation=1e-3
     )
-    solver = tiered.Settings(ruled).at(None, None).system.solver
+    solver = tiered.Settings(ruled).scene_with(None, None).system.solver
     assert (solver.loads, solver.regularisation) == ("exact", 1e-9)
 
 

@@ -586,7 +586,7 @@ def test_a_setting_for_pieces():
     )
     coarse = [
         SceneTables(
-            tiered.Settings(depth.with_numerics(phases=64)).at(setting, n)
+            tiered.Settings(depth.with_numerics(phases=64)).scene_with(setting, n)
         ).poses("direct", Circle(), a)
         for n in setting.values
     ]

@@ -32,7 +32,7 @@ from geomech.run import runner as runners
 from geomech.studies.displacement import cycles
 store.CHECKPOINT = runners.CHECKPOINT = 0.05
 pending.WORTH_PROCESSES = 0.2
-connection.SAMPLES_TOGETHER, cycles.SAMPLES_TOGETHER = 400, 8
+connection.SAMPLES_TOGETHER, cycles.BATCH_SIZE = 400, 8
 print("begun", flush=True)
 cli.main()
 """

@@ -1,4 +1,5 @@
-"""Questions about a scene, each with a check, a cost and a result: one module a question, and what they share."""
+"""Questions about a scene, one module each with a check, a cost and a result, and what
+they share."""
 
 from geomech.core import modules as _modules
 

@@ -15,18 +15,19 @@ from geomech.scenes.read import from_tables
 from rft.core.checks import real_array
 from rft.core.refusal import Refusal
 
-MAX_POINTS = 100_000_000  # points
-MAX_TESTED_VALUES = (
-    200  # values of a parameter for which a scene is built as a test, some 0.5 ms each
-)
+MAX_POINTS = 100_000_000
+# Values of a parameter for each of which a scene is built as a test, in some 0.5 ms.
+MAX_TESTED_VALUES = 200
+SECTIONS = ("medium", "body", "gait", "numerics", "system", "physical", "robot")
 
 
 @dataclass(frozen=True)
 class Grid:
     """Values of some parameters of a scene, and the tables of its file.
 
-    inner: the parameter, or "", whose values make up a batch: it varies fastest, and no scene is read for it. idle:
-    parameters that change no row; all points have their first value."""
+    inner: name of the parameter whose values make up a batch, "" for none: it varies
+    fastest, and no scene is read for it. idle: parameters that change no row; all
+    points have their first value."""
 
     scene: Any
     over: Mapping[str, list[float]]
@@ -37,17 +38,23 @@ class Grid:
     @property
     def names(self) -> list[str]:
         """Names of the parameters, the inner one last."""
-        return [k for k in self.over if k != self.inner] + [
-            k for k in self.over if k == self.inner
-        ]
+        names = self._outer_names
+        if self.inner in self.over:
+            names.append(self.inner)
+        return names
+
+    @property
+    def _outer_names(self) -> list[str]:
+        return [name for name in self.over if name != self.inner]
 
     @property
     def values(self) -> dict[str, list[float]]:
+        """Values by parameter, the inner one last."""
         return {name: self.over[name] for name in self.names}
 
     @property
     def inner_values(self) -> list[float] | None:
-        """Values of the inner parameter, if it is one of the grid's."""
+        """Values of the inner parameter; None if the grid has none."""
         return self.over.get(self.inner)
 
     @property
@@ -62,53 +69,51 @@ class Grid:
     @cached_property
     def points(self) -> Points:
         """Points of the parameters other than the inner one."""
-        outer = [name for name in self.names if name != self.inner]
-        return Points(
-            [
-                self.over[name][:1] if name in self.idle else self.over[name]
-                for name in outer
-            ]
-        )
+        axes = []
+        for name in self._outer_names:
+            values = self.over[name]
+            axes.append(values[:1] if name in self.idle else values)
+        return Points(axes)
 
     @cached_property
     def scene_factory(self) -> SceneFactory:
+        """Function that builds the scene at a point."""
         return SceneFactory(dict(self.tables), self.scene, tuple(self.names))
 
     def corners(self) -> Iterator[tuple[float, ...]]:
-        """Yield the corners, and the values of each parameter with the others at their
-        first: all, or of more than `MAX_TESTED_VALUES` some, with the least and the
-        largest."""
-        outer = [self.over[name] for name in self.names if name != self.inner]
-        yield from itertools.product(*([v[0], v[-1]] for v in outer))
+        """Yield the points that are tested before a sweep starts: the corners, and the
+        values of each parameter with the others at their first."""
+        outer = [self.over[name] for name in self._outer_names]
+        yield from itertools.product(*([values[0], values[-1]] for values in outer))
         for k, values in enumerate(outer):
-            tested = (
-                values
-                if len(values) <= MAX_TESTED_VALUES
-                else [
-                    min(values),
-                    max(values),
-                    *values[:: -(-len(values) // MAX_TESTED_VALUES)],
-                ]
-            )
-            yield from (
-                (*(v[0] for v in outer[:k]), x, *(v[0] for v in outer[k + 1 :]))
-                for x in tested
-            )
+            point = [other[0] for other in outer]
+            for value in _tested_values(values):
+                point[k] = value
+                yield tuple(point)
 
     def arranged(self, rows: np.ndarray) -> np.ndarray:
-        """Return rows (`total`, width) as an array (N_1, ..., width) over the parameters in the order given."""
+        """Return rows (`total`, width) as an array (N_1, ..., width) over the
+        parameters in the order given."""
         names = self.names
+        width = np.shape(rows)[-1]
         computed = [1 if name in self.idle else len(self.over[name]) for name in names]
         full = [len(self.over[name]) for name in names]
-        flat = np.broadcast_to(
-            np.reshape(rows, (*computed, -1)), (*full, np.shape(rows)[-1])
-        )
-        return np.transpose(flat, (*(names.index(k) for k in self.over), len(names)))
+        on_grid = np.broadcast_to(np.reshape(rows, (*computed, -1)), (*full, width))
+        order = [names.index(name) for name in self.over]
+        return np.transpose(on_grid, (*order, len(names)))
+
+
+def _tested_values(values: list[float]) -> list[float]:
+    """Return the values of a parameter, or of many the least, the largest and some."""
+    if len(values) <= MAX_TESTED_VALUES:
+        return values
+    step = -(-len(values) // MAX_TESTED_VALUES)
+    return [min(values), max(values), *values[::step]]
 
 
 def checked_grid_values(over: Mapping[str, Any]) -> dict[str, list[float]]:
-    """Return the values by parameter; Refusal unless they form a grid."""
-    if not (isinstance(over, Mapping) and all(isinstance(k, str) for k in over)):
+    """Return the values by parameter as lists; Refusal unless they form a grid."""
+    if not (isinstance(over, Mapping) and all(isinstance(name, str) for name in over)):
         raise Refusal(
             "over must be values by parameter, such as {'gait.amplitude': [0.5, 1.0]}",
             value=over,
@@ -132,7 +137,7 @@ def _checked_list(name: str, values: Any) -> list[float]:
 
 
 class SceneFactory(NamedTuple):
-    """The scene at a point of a grid."""
+    """Function from a point of a grid, values by ``names``, to the scene there."""
 
     tables: dict[str, Any]
     scene: Any
@@ -146,111 +151,106 @@ class SceneFactory(NamedTuple):
 
 
 class Points:
-    """Points of a grid, the last parameter varying fastest. None is stored, as there may be millions."""
+    """Points of a grid, the last parameter varying fastest. None is stored, as there
+    may be millions."""
 
     def __init__(self, axes: list[list[float]]):
-        self.axes, self.sizes = axes, tuple(map(len, axes))
+        self.axes = axes
+        self.sizes = tuple(map(len, axes))
         self.total = math.prod(self.sizes)
 
     def __getitem__(self, k: int) -> tuple[float, ...]:
-        return (
-            tuple(
-                axis[i] for axis, i in zip(self.axes, np.unravel_index(k, self.sizes))
-            )
-            if self.axes
-            else ()
-        )
+        if not self.axes:
+            return ()
+        indices = np.unravel_index(k, self.sizes)
+        return tuple(axis[i] for axis, i in zip(self.axes, indices))
 
 
 def with_parameter(tables: dict, parameter: str, value: float) -> dict:
-    """Return the tables with one parameter set: "section.key", "effects.KIND.key" for an effect that is on, or
-    "effects.key" for all effects that give that key."""
-    parts = parameter.split(".")
-    within = (
-        tables.get("robot", {}).get(parts[1])
-        if len(parts) == 3 and parts[0] == "robot"
-        else None
-    )
-    if isinstance(within, dict):  # a table inside a table
-        inner = with_parameter({"robot": within}, f"robot.{parts[2]}", value)
-        return {**tables, "robot": {**tables["robot"], parts[1]: inner["robot"]}}
-    if len(parts) == 2 and parts[0] in (
-        "medium",
-        "body",
-        "gait",
-        "numerics",
-        "system",
-        "physical",
-        "robot",
-    ):
-        old = tables.get(parts[0], {}).get(parts[1])
-        tables = {
-            **tables,
-            parts[0]: {
-                k: v
-                for k, v in tables.get(parts[0], {}).items()
-                if k != _key_in_other_unit(parts[1])
-            },
-        }
-        value = (
-            int(value)
-            if isinstance(old, int)
-            and not isinstance(old, bool)
-            and value == int(value)
-            else value
-        )
-        return {**tables, parts[0]: {**tables.get(parts[0], {}), parts[1]: value}}
-    if len(parts) == 2 and parts[0] == "effects":
-        effects = tables.get("effects", [])
-        if any(parts[1] in e for e in effects):
-            return {
-                **tables,
-                "effects": [
-                    {**e, parts[1]: value} if parts[1] in e else e for e in effects
-                ],
-            }
-        raise Refusal(
-            f"no effect of the scene gives {parts[1]!r}",
-            where=f"``over`` {parameter}",
-            instead="name the effect, or add it",
-        )
-    if len(parts) == 3 and parts[0] == "effects":
-        effects = tables.get("effects", [])
-        if any(e.get("kind") == parts[1] for e in effects):
-            return {
-                **tables,
-                "effects": [
-                    {**e, parts[2]: value} if e["kind"] == parts[1] else e
-                    for e in effects
-                ],
-            }
-        raise Refusal(
-            f"the scene has no effect {parts[1]!r}",
-            where=f"``over`` {parameter}",
-            instead="add it as [[effects]]",
-        )
+    """Return the tables of a scene with one parameter set.
+
+    parameter: "section.key", "robot.table.key" for a table inside [robot],
+    "effects.KIND.key" for an effect of the scene, or "effects.key" for all its effects
+    that give that key."""
+    section, *keys = parameter.split(".")
+    if section == "effects" and len(keys) in (1, 2):
+        return {**tables, "effects": _with_effect_key(tables, parameter, value)}
+
+    if section in SECTIONS and len(keys) == 1:
+        return {**tables, section: _with_key(tables.get(section, {}), keys[0], value)}
+
+    if section == "robot" and len(keys) == 2:
+        robot = tables.get("robot", {})
+        within = robot.get(keys[0])
+        if isinstance(within, dict):
+            within = _with_key(within, keys[1], value)
+            return {**tables, "robot": {**robot, keys[0]: within}}
+
     raise Refusal(
         "name a parameter such as gait.amplitude, medium.C or effects.end-caps.radius",
         where=f"``over`` {parameter}",
     )
 
 
+def _with_key(section: Mapping, key: str, value: float) -> dict:
+    """Return a section with one key set, and without the same key in another unit. A
+    whole number stays one."""
+    old = section.get(key)
+    is_whole = isinstance(old, int) and not isinstance(old, bool)
+    if is_whole and value == int(value):
+        value = int(value)
+    other = _key_in_other_unit(key)
+    return {**{k: v for k, v in section.items() if k != other}, key: value}
+
+
+def _with_effect_key(tables: Mapping, parameter: str, value: float) -> list[dict]:
+    """Return the effects of a scene with a key set: of one kind, or of all that give
+    it."""
+    *kinds, key = parameter.split(".")[1:]
+    effects = tables.get("effects", [])
+    if kinds:
+        are_meant = [effect.get("kind") == kinds[0] for effect in effects]
+    else:
+        are_meant = [key in effect for effect in effects]
+
+    if not any(are_meant):
+        if kinds:
+            raise Refusal(
+                f"the scene has no effect {kinds[0]!r}",
+                where=f"``over`` {parameter}",
+                instead="add it as [[effects]]",
+            )
+        raise Refusal(
+            f"no effect of the scene gives {key!r}",
+            where=f"``over`` {parameter}",
+            instead="name the effect, or add it",
+        )
+    return [
+        {**effect, key: value} if is_meant else effect
+        for effect, is_meant in zip(effects, are_meant)
+    ]
+
+
 def _key_in_other_unit(key: str) -> str:
     """Return the name of the same key in degrees, or in rad."""
-    return key.removesuffix("_deg") if key.endswith("_deg") else f"{key}_deg"
+    if key.endswith("_deg"):
+        return key.removesuffix("_deg")
+    return f"{key}_deg"
 
 
 def values_at_points(over: Mapping[str, list[float]], names: tuple[str, ...], value):
-    """Return a number (N_1, ...) at the points of a sweep: the swept parameter with one of these names, else ``value``,
-    or None."""
-    for axis, (name, values) in enumerate(over.items()):
-        if name.partition(".")[0] in names and name.rpartition(".")[2] == names[-1]:
-            along = np.reshape(
-                values, [-1 if k == axis else 1 for k in range(len(over))]
-            )
-            return np.broadcast_to(along, [len(v) for v in over.values()]).copy()
-    return (
-        None
-        if value is None
-        else np.full([len(v) for v in over.values()], float(value))
-    )
+    """Return a number (N_1, ...) at the points of a sweep; None if it is unknown.
+
+    names: sections that may have it, and last its key. It is that of the swept
+    parameter with such a name, else ``value``."""
+    key = names[-1]
+    shape = [len(values) for values in over.values()]
+    for axis, (parameter, values) in enumerate(over.items()):
+        section = parameter.partition(".")[0]
+        if section in names and parameter.rpartition(".")[2] == key:
+            along = [1] * len(shape)
+            along[axis] = -1
+            return np.broadcast_to(np.reshape(values, along), shape).copy()
+    if value is None:
+        return None
+    return np.full(shape, float(value))

@@ -570,7 +570,7 @@ def _may_leave(
 
 
 def timed_call(function: Callable, *args: Any) -> tuple[Any, float]:
-    """Return (function(*args), the seconds that it took)."""
+    """Return the value of a call, and the seconds that it took."""
     start = time.perf_counter()
     value = function(*args)
     return value, time.perf_counter() - start

@@ -13,7 +13,7 @@ from geomech.core.setting import ROUNDING, Setting
 from geomech.core.variables import Variable
 
 DIMS = ("setting", "fineness")
-NONE = "none"  # stands for a setting where none meets a tolerance
+NONE = "none"  # in place of a setting where none meets a tolerance
 MIN_ERRORS = 3  # errors above rounding from which an order is measured
 
 
@@ -21,7 +21,7 @@ MIN_ERRORS = 3  # errors above rounding from which an order is measured
 class Measurements:
     """Runs at the values of settings, from coarse to fine.
 
-    values, seconds and errors, by their names: (S, F) of S settings; nan behind the last
+    values, seconds, and errors by measure: (S, F) for S settings; nan behind the last
     value of a setting that has fewer than F."""
 
     settings: Sequence[Setting]
@@ -31,7 +31,7 @@ class Measurements:
 
 
 class Choice(NamedTuple):
-    """A value of a setting, by their numbers."""
+    """A value of a setting: the index of the setting, and that of the value."""
 
     setting: int
     value: int
@@ -47,20 +47,23 @@ def padded_array(rows: Sequence[Sequence[float]]) -> np.ndarray:
 
 
 def measured_order(values: np.ndarray, errors: np.ndarray) -> float:
-    """Return the measured order of errors in the coarseness, by least squares; nan where
-    fewer than `MIN_ERRORS` are more than rounding."""
-    is_seen = errors > ROUNDING
-    if is_seen.sum() < MIN_ERRORS:
+    """Return the measured order of errors in the coarseness, by least squares; nan
+    where fewer than `MIN_ERRORS` are more than rounding."""
+    is_significant = errors > ROUNDING
+    if is_significant.sum() < MIN_ERRORS:
         return np.nan
     x = np.log(values[np.isfinite(values)])
-    slope = np.polyfit(np.log(values[is_seen]), np.log(errors[is_seen]), 1)[0]
+    log_values = np.log(values[is_significant])
+    log_errors = np.log(errors[is_significant])
+    slope = np.polyfit(log_values, log_errors, 1)[0]
     if x[0] < x[-1]:
         return -slope
     return slope
 
 
 def order_name(error: str) -> str:
-    """Return the name of the order of an error: order, or force_order of force_error."""
+    """Return the name of the order of an error: order, or force_order of
+    force_error."""
     return error.removesuffix("error") + "order"
 
 
@@ -84,7 +87,9 @@ def measurement_variables(
     yield Variable("seconds", DIMS, measured.seconds, "s", "of the quickest run")
     for name, errors in measured.errors.items():
         yield Variable(name, DIMS, errors, unit, labels[name])
-        orders = [measured_order(*pair) for pair in zip(measured.values, errors)]
+        orders = []
+        for values, setting_errors in zip(measured.values, errors):
+            orders.append(measured_order(values, setting_errors))
         label = "measured, nan where all is rounding"
         yield Variable(order_name(name), ("setting",), np.array(orders), "1", label)
 
@@ -98,9 +103,10 @@ def choice_variables(
 ) -> list[Variable]:
     """Return the value that is chosen for each tolerance, its error and its seconds.
 
-    errors: (S, F), those that are held against the tolerances. choose: returns the value
-    for a tolerance, None where none of those tried meets it."""
-    names, rows = [], []
+    errors: (S, F), which are compared with the tolerances. choose: returns the value
+    for a tolerance; None where no value meets it."""
+    names = []
+    rows = []
     for tolerance in tolerances:
         choice = choose(float(tolerance))
         if choice is None:

@@ -1,5 +1,5 @@
-"""Net poses of gaits as variables: x, y, heading and net distance by tier and amplitude,
-with units, errors and the effect of an uncertain medium."""
+"""Net poses of gaits as variables: x, y, heading and net distance by tier and
+amplitude, with units, errors and the effect of an uncertain medium."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ def poses(result: Mapping[str, Variable]) -> np.ndarray:
     return np.stack([result[name].values for name in POSE], -1)
 
 
-def zero_reason(why: str) -> str:
-    """Return why a quantity is zero, for a reason of `zero_components`."""
-    return f"by symmetry, as {why}"
+def zero_reason(reason: str) -> str:
+    """Return why a quantity is zero in words, for a reason of `zero_components`."""
+    return f"by symmetry, as {reason}"
 
 
 def pose_variables(
@@ -51,10 +51,10 @@ def pose_variables(
     """Return QUANTITIES of net poses (..., 3) as variables, and the speed, net distance
     times frequency, where that is known.
 
-    errors: (..., 2), of the position, in ``unit``, which bounds those of x, y and the net
-    distance, and of the heading, rad. spread: standard deviations of QUANTITIES by the
-    medium's covariance. frequency: Hz, a number or (...,). zero: why quantities are zero,
-    by name."""
+    errors: (..., 2), of the position, in ``unit``, which bounds those of x, y and the
+    net distance, and of the heading, rad. spread: standard deviations of QUANTITIES by
+    the medium's covariance. frequency: Hz, a number or (...,). zero: why quantities are
+    zero, by name."""
     errors = np.asarray(errors)
     zero = zero or {}
     variables = []
@@ -103,31 +103,26 @@ def displacement_result(
     """Return the net poses (B, 3) of a gait by tier as a result; lengths are in the
     system's unit.
 
-    errors: (B, 2) by tier, as `geomech.studies.estimates.estimate` gives them, in body lengths and
-    rad. medium: what the uncertainty of the medium does to the true displacement, and so
-    to every tier's (`geomech.studies.estimates.uncertainty.medium_spread`), or None. choices: (B, 2),
-    the system's unit and rad, of tiers whose answer depends on the surface that a loop of
-    three and more joints spans. more: variables, such as the seconds that parts took.
-    facts: attributes."""
+    errors: (B, 2) by tier, body lengths and rad, of `geomech.studies.estimates.estimate`. medium:
+    spread of the true displacement by an uncertain medium, which every tier shares
+    (`geomech.studies.estimates.uncertainty.medium_spread`), or None. choices: (B, 2), the
+    system's unit and rad, of tiers whose answer depends on the surface that a loop of
+    three and more joints spans. more: further variables. facts: further attributes."""
     system, tiers = scene.system, tuple(poses)
     unit = length_unit(system)
     length = body_size(system)
     frequency = frequency_of(system, gait)
 
-    def stacked(by: Mapping, width: int) -> np.ndarray:
-        arrays = np.array([by[tier] for tier in tiers], float)
-        return arrays.reshape(len(tiers), len(amplitudes), width)
-
     values = np.asarray(amplitudes, float)
-    why = zero_components(system.traits, gait, amplitudes)
-    zero = {name: zero_reason(reason) for name, reason in why.items()}
+    reasons = zero_components(system.traits, gait, amplitudes)
+    zero = {name: zero_reason(reason) for name, reason in reasons.items()}
     variables = [
         Variable("tier", ("tier",), np.array(tiers, dtype="U")),
         Variable("amplitude", ("amplitude",), values, "", gait.amplitude_label),
         *pose_variables(
             DIMS,
-            stacked(poses, 3),
-            stacked(errors, 2) * [length, 1.0],
+            _stacked(poses, tiers, amplitudes, 3),
+            _stacked(errors, tiers, amplitudes, 2) * [length, 1.0],
             unit,
             medium,
             frequency,
@@ -147,34 +142,55 @@ def displacement_result(
         variables += medium_variables(medium, unit)
     if choices:
         unknown = np.full((len(amplitudes), 2), np.nan)
-        spread = stacked({t: choices.get(t, unknown) for t in tiers}, 2)
-        label = "how far surfaces that a loop spans differ"
-        for k, (name, of) in enumerate(zip(SURFACE, (unit, "rad"))):
-            variables.append(Variable(name, DIMS, spread[..., k], of, label))
+        by_tier = {tier: choices.get(tier, unknown) for tier in tiers}
+        spread = _stacked(by_tier, tiers, amplitudes, 2)
+        variables += _surface_variables(spread, unit)
     if system.joints == 2:
-        area, area_error = loop_area(gait, scene.numerics.phases, values)
-        label = "in shape space, counter-clockwise positive"
-        over = ("amplitude",)
-        variables.append(Variable("loop_area", over, area, "rad2", label, area_error))
+        variables.append(_loop_area(gait, scene.numerics.phases, values))
     error_is = getattr(gait, "estimate_is", "")
     if error_is:
         attributes["error_is"] = error_is
     return Result("displacement", (*variables, *more), {**attributes, **facts})
 
 
+def _stacked(
+    by_tier: Mapping, tiers: Sequence[str], amplitudes, width: int
+) -> np.ndarray:
+    """Return arrays by tier as one, (tiers, amplitudes, width)."""
+    arrays = np.array([by_tier[tier] for tier in tiers], float)
+    return arrays.reshape(len(tiers), len(amplitudes), width)
+
+
+def _surface_variables(spread: np.ndarray, unit: str) -> list[Variable]:
+    """Return how far answers differ between surfaces that a loop spans, from (tiers,
+    amplitudes, 2): in position and heading."""
+    position, heading = SURFACE
+    label = "how far surfaces that a loop spans differ"
+    return [
+        Variable(position, DIMS, spread[..., 0], unit, label),
+        Variable(heading, DIMS, spread[..., 1], "rad", label),
+    ]
+
+
+def _loop_area(gait: Gait, phases: int, amplitudes: np.ndarray) -> Variable:
+    """Return the area of a gait's loop in shape space at each amplitude."""
+    area, error = loop_area(gait, phases, amplitudes)
+    label = "in shape space, counter-clockwise positive"
+    return Variable("loop_area", ("amplitude",), area, "rad2", label, error)
+
+
 def rate_variables(
     variables: Sequence[Variable], frequency: float, length: float
 ) -> list[Variable]:
     """Return the speed in body lengths and the turning rate."""
-    by_name = {v.name: v for v in variables}
-    label = "net distance in body lengths times frequency"
-    net, heading = by_name["net_distance"], by_name["heading"]
-    net = net.with_arrays(np.asarray, spread=None)
-    heading = heading.with_arrays(np.asarray, spread=None)
-    label_of_turns = "heading times frequency"
+    by_name = {variable.name: variable for variable in variables}
+    net = by_name["net_distance"].with_arrays(np.asarray, spread=None)
+    heading = by_name["heading"].with_arrays(np.asarray, spread=None)
+    speed_label = "net distance in body lengths times frequency"
+    turning_label = "heading times frequency"
     return [
-        scaled(net, frequency / length, "speed_body_lengths", "BL/s", label),
-        scaled(heading, frequency, "turning_rate", "rad/s", label_of_turns),
+        scaled(net, frequency / length, "speed_body_lengths", "BL/s", speed_label),
+        scaled(heading, frequency, "turning_rate", "rad/s", turning_label),
     ]
 
 
@@ -203,13 +219,13 @@ def position_spread(result: Mapping[str, Variable]) -> np.ndarray:
 
 
 def timing_variables(
-    took: Mapping[str, float], stored: Sequence[str]
+    seconds: Mapping[str, float], stored: Sequence[str]
 ) -> list[Variable]:
-    """Return the seconds that parts of a computation took, and whether they were computed
-    before."""
-    before = [int(part in stored) for part in took]
+    """Return the seconds that parts of a computation took, and whether they were stored
+    already."""
+    was_stored = [int(part in stored) for part in seconds]
     return [
-        Variable("part", ("part",), np.array([*took], dtype="U")),
-        Variable("seconds", ("part",), [*took.values()], "s", "of computing"),
-        Variable("computed_before", ("part",), before, "1", "1 if it was"),
+        Variable("part", ("part",), np.array([*seconds], dtype="U")),
+        Variable("seconds", ("part",), [*seconds.values()], "s", "of computing"),
+        Variable("computed_before", ("part",), was_stored, "1", "1 if it was"),
     ]

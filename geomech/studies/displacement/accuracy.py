@@ -1,10 +1,9 @@
 """Accuracy studies: error against computing time of an answer, at settings of every
 approximation from coarse to fine.
 
-A setting declares its values from coarse to fine, the order of its error by theory and its
-reference: the truth, common to all settings, or the limit of that setting alone, all else
-being equal.
-"""
+A setting declares its values from coarse to fine, the order of its error by theory, and
+its reference: the truth, common to all settings, or the limit of that setting alone,
+with all other settings unchanged."""
 
 from __future__ import annotations
 
@@ -21,18 +20,16 @@ from geomech.run.cost import Cost
 from geomech.run.runner import runner
 from geomech.studies.settings import Measurements, measurement_variables, padded_array
 
-KINDS = {
-    "robot": "terradynamics.walking",
-    "intruder": "terradynamics.intrusion",
-}  # loaded only where needed
-DIGITS = 3  # of seconds: a second run differs in the second
+# Modules of other kinds of scene, loaded only where needed.
+KINDS = {"robot": "terradynamics.walking", "intruder": "terradynamics.intrusion"}
+DIGITS = 3  # of seconds: another run differs in the second digit
 
 
 class AccuracySubject(Protocol):
     """An answer whose approximations can be set: the subject of an accuracy study.
 
-    about: the answer in words. unit: of its errors, which ``measures`` has with their
-    labels by name. runs: how often each setting is timed."""
+    about: the answer in words. unit: of its errors. measures: labels of these by name.
+    runs: how often each setting is timed."""
 
     scene: Any
     about: ClassVar[str]
@@ -52,8 +49,8 @@ class AccuracySubject(Protocol):
     def settings(self) -> list[Setting]: ...
 
     def evaluate(self, setting: Setting | None, value: Any) -> list[np.ndarray]:
-        """Return the answer at a value of a setting; for None the limit of the setting,
-        without a setting the truth."""
+        """Return the answer at a value of a setting. If the value is None, it is the
+        limit of the setting; without a setting, the truth."""
 
     def errors(
         self, numbers: list[np.ndarray], truth: list[np.ndarray]
@@ -61,7 +58,8 @@ class AccuracySubject(Protocol):
         """Return the error of an answer by measure."""
 
     def choices(self, measured: Measurements) -> list[Variable]:
-        """Return which values meet tolerances, and other variables of the whole study."""
+        """Return the values that meet tolerances, and other variables of the whole
+        study."""
 
     def facts(self) -> dict[str, Any]:
         """Return attributes of the whole study."""
@@ -83,8 +81,8 @@ def accuracy_subject(scene: Any, runs: int | None = None) -> AccuracySubject:
 def answer(subject: AccuracySubject, progress: Callable | None = None) -> Result:
     """Return error and seconds at every value of the settings of a subject.
 
-    Each value is timed ``runs`` times, and the quickest counts, so that first calls that
-    load and warm up do not. Seconds are CPU seconds of one thread."""
+    Each value is timed ``runs`` times, and the quickest run counts, since first calls
+    load and compile code. Seconds are CPU seconds of one thread."""
     subject = subject.with_shared_data()
     measured = measure(subject, progress)
     found = [
@@ -101,8 +99,10 @@ def measure(subject: AccuracySubject, progress: Callable | None) -> Measurements
     tasks = [*list_tasks(settings, subject.runs)]
     answers = runner().map(timed_answer, subject, tasks, len(tasks), progress=progress)
     truth = None
-    if tasks[0][0] is None:
+    first_setting, _, _ = tasks[0]
+    if first_setting is None:
         truth, _ = next(answers)
+
     seconds: list[list[float]] = []
     errors: dict[str, list[list[float]]] = {name: [] for name in subject.measures}
     for setting in settings:
@@ -112,11 +112,13 @@ def measure(subject: AccuracySubject, progress: Callable | None) -> Measurements
         seconds.append([])
         for rows in errors.values():
             rows.append([])
+
         for _ in setting.values:
-            numbers, took = next(answers)
-            seconds[-1].append(took)
+            numbers, run_seconds = next(answers)
+            seconds[-1].append(run_seconds)
             for name, error in subject.errors(numbers, reference).items():
                 errors[name][-1].append(error)
+
     return Measurements(
         settings,
         padded_array([setting.values for setting in settings]),
@@ -126,8 +128,8 @@ def measure(subject: AccuracySubject, progress: Callable | None) -> Measurements
 
 
 def list_tasks(settings: list[Setting], runs: int) -> Iterator[tuple]:
-    """Yield (setting, value, runs): without a setting the truth, if any setting is
-    compared to that; without a value the limit of the setting."""
+    """Yield (setting, value, runs). The truth has no setting, and comes first if any
+    setting is compared with it; the limit of a setting has no value."""
     if any(setting.against == "truth" for setting in settings):
         yield None, None, 1
     for setting in settings:

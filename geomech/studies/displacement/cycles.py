@@ -1,4 +1,5 @@
-"""Net displacements of the gaits of many scenes, by the direct tier with its errors: the question of a sweep."""
+"""Net displacements of the gaits of many scenes by the direct tier, with their errors:
+the question of a sweep."""
 
 from __future__ import annotations
 
@@ -20,19 +21,13 @@ from geomech.studies.estimates import estimate, uncertainty
 from geomech.studies.estimates.cost import direct_jobs, medium_jobs, total_cost
 from geomech.studies.grid import Grid, values_at_points
 
-BYTES_PER_POINT = (
-    200  # bytes of a point: its row, and copies of it on the way to a file
-)
-SECONDS_PER_SCENE = 6e-4  # s to build a scene from its tables, measured
-BATCH_SIZE = 64  # gaits of a batch: enough to fill the solver, few enough to lose little when stopped
-ROW_WIDTH = 5  # numbers of a point: x, y, theta and the errors of position and heading
+BYTES_PER_POINT = 200  # of its row, and of copies while it is written to a file
+SECONDS_PER_SCENE = 6e-4  # to build one from its tables; measured
+# Gaits of a batch: enough to fill the solver, and little is lost when a sweep stops.
+BATCH_SIZE = 64
+ROW_WIDTH = 5  # numbers of a row: x, y, theta and the errors of position and heading
 AMPLITUDE = "gait.amplitude"
-FREQUENCIES = (
-    "gait",
-    "physical",
-    "effects",
-    "frequency",
-)  # sections that have one, and its key
+FREQUENCIES = ("gait", "physical", "effects", "frequency")  # sections, and their key
 
 
 @dataclass(frozen=True)
@@ -40,13 +35,13 @@ class Cycles:
     """Net displacement per cycle, as a question of sweeps."""
 
     def grid(self, scene: Scene, over: Mapping[str, list[float]]) -> Grid:
-        """Return the grid; amplitudes of one scene make one batch. Refusal if a corner makes no scene."""
-        tables_ = written.tables(checked_scene(scene))
+        """Return the grid; the amplitudes of one scene make up a batch. Refusal if a
+        corner makes no scene."""
+        scene_tables = written.tables(checked_scene(scene))
         if any(name.startswith("medium.") for name in over):
-            tables_ = written.with_law(tables_, scene)
-        grid = Grid(
-            scene, over, tables_, AMPLITUDE, _parameters_without_effect(scene, over)
-        )
+            scene_tables = written.with_law(scene_tables, scene)
+        idle = _parameters_without_effect(scene, over)
+        grid = Grid(scene, over, scene_tables, AMPLITUDE, idle)
         for corner in grid.corners():
             corner_scene = grid.scene_factory(corner)
             if uncertainty.is_uncertain(corner_scene.system):
@@ -57,136 +52,154 @@ class Cycles:
         return min(BATCH_SIZE, gaits_per_batch(scene.system, scene.numerics.phases))
 
     def rows(self, scenes: list[Scene], amplitudes: list[float] | None) -> np.ndarray:
-        """Return x, y, theta, errors of position and heading, and standard deviations of QUANTITIES where the medium is
-        uncertain. x and y are in the scene's unit, other lengths in body lengths."""
+        """Return x, y, theta, the errors of position and heading, and where the medium
+        is uncertain the standard deviations of QUANTITIES. x and y are in the scene's
+        unit, other lengths in body lengths."""
         rows = np.array(_rows(scenes, amplitudes))
         if uncertainty.is_uncertain(scenes[0].system):
-            rows = np.column_stack(
-                [rows, _solve_in_batches(scenes, amplitudes, _medium_deviations)]
-            )
+            deviations = _solve_in_batches(scenes, amplitudes, _medium_deviations)
+            rows = np.column_stack([rows, deviations])
         return rows
 
     def cost(self, grid: Grid) -> Cost:
-        """Return a forecast from some of the points."""
-        points, at, total = grid.points, grid.scene_factory, grid.total
-        first = [at(points[k]) for k in range(min(points.total, BATCH_SIZE))]
-        together = max(
-            1,
-            min(
-                BATCH_SIZE,
-                total // points.total * len(first) // len(set(map(batch_key, first))),
-            ),
-        )
-        samples = [at(points[k]) for k in {0, points.total // 2, points.total - 1}]
-        requests = [(s, s.gait, total, s.numerics.phases) for s in samples]
-        jobs = [
-            direct_jobs(*one, together) + medium_jobs(*one[:3], together)
-            for one in requests
-        ]
-        balances, seconds, _, besides, steps = np.mean(
-            list(map(total_cost, jobs)), 0
-        ).tolist()
-        memory = [
-            direct_jobs(s, s.gait, min(total, BATCH_SIZE), s.numerics.phases)[0].memory
-            for s in samples
-        ]
-        making = SECONDS_PER_SCENE * points.total
+        """Return a forecast from three points of the grid."""
+        n_points = grid.points.total
+        total = grid.total
+        batch_size = _mean_batch_size(grid)
+        costs = []
+        memories = []
+        for k in sorted({0, n_points // 2, n_points - 1}):
+            scene = grid.scene_factory(grid.points[k])
+            gait, phases = scene.gait, scene.numerics.phases
+            jobs = direct_jobs(scene, gait, total, phases, batch_size)
+            jobs += medium_jobs(scene, gait, total, batch_size)
+            costs.append(total_cost(jobs))
+            one_batch = direct_jobs(scene, gait, min(total, BATCH_SIZE), phases)
+            memories.append(one_batch[0].memory)
+
+        balances, seconds, _, besides, steps = np.mean(costs, 0).tolist()
+        building = SECONDS_PER_SCENE * n_points
+        memory = max(memories) + BYTES_PER_POINT * total
         return Cost(
-            round(balances),
-            seconds + making,
-            max(memory) + BYTES_PER_POINT * total,
-            besides + making,
-            steps,
+            round(balances), seconds + building, memory, besides + building, steps
         )
 
     def variables(
         self, grid: Grid, rows: np.ndarray, dims: tuple[str, ...]
     ) -> tuple[list[Variable], dict]:
-        """Return net poses with their errors, the body's length, and frequency and speed where there is a frequency."""
-        scene, length = grid.scene, _lengths(grid)
-        first = grid.scene_factory([x[0] for x in grid.values.values()])
+        """Return net poses with their errors, the body's length, and the frequency and
+        the speed where there is a frequency."""
+        scene = grid.scene
+        length = _lengths(grid)
+        first = grid.scene_factory([values[0] for values in grid.values.values()])
         unit = length_unit(first.system)  # a swept length gives every point a size
         errors = np.stack([length * rows[..., 3], rows[..., 4]], -1)
-        sizes = [length, length, np.ones_like(length), length]
-        spread = {
-            name: x * size
-            for name, x, size in zip(
-                tables.QUANTITIES, np.moveaxis(rows[..., ROW_WIDTH:], -1, 0), sizes
-            )
-        }
         frequency = values_at_points(grid.over, FREQUENCIES, scene.frequency)
-        out = tables.pose_variables(
-            dims, rows[..., :3], errors, unit, spread or None, frequency
+        found = tables.pose_variables(
+            dims, rows[..., :3], errors, unit, _spreads(rows, length), frequency
         )
-        out.append(Variable("body_length", dims, length, unit, "length of the body"))
-        out += (
-            [] if frequency is None else [Variable("frequency", dims, frequency, "Hz")]
-        )
+        found.append(Variable("body_length", dims, length, unit, "length of the body"))
+        if frequency is not None:
+            found.append(Variable("frequency", dims, frequency, "Hz"))
+
+        facts = {}
         error_is = getattr(scene.gait, "estimate_is", "")
-        facts = {"error_is": error_is} if error_is else {}
-        return out, facts
+        if error_is:
+            facts["error_is"] = error_is
+        return found, facts
+
+
+def _spreads(rows: np.ndarray, length: np.ndarray) -> dict[str, np.ndarray] | None:
+    """Return the standard deviations of QUANTITIES in the scene's unit and rad; None
+    for rows without them."""
+    deviations = np.moveaxis(rows[..., ROW_WIDTH:], -1, 0)
+    if not len(deviations):
+        return None
+    sizes = [length, length, np.ones_like(length), length]
+    return {
+        name: deviation * size
+        for name, deviation, size in zip(tables.QUANTITIES, deviations, sizes)
+    }
+
+
+def _mean_batch_size(grid: Grid) -> int:
+    """Return the number of gaits that batches have on average, from the first scenes:
+    only scenes that can share a batch are solved together."""
+    n_points = grid.points.total
+    n_first = min(n_points, BATCH_SIZE)
+    keys = {batch_key(grid.scene_factory(grid.points[k])) for k in range(n_first)}
+    gaits = grid.total // n_points * n_first // len(keys)
+    return max(1, min(BATCH_SIZE, gaits))
 
 
 def _lengths(grid: Grid) -> np.ndarray:
-    """Return the body's length (N_1, ...) at the points of a grid. Each parameter either multiplies it or does not
-    change it."""
-    values = grid.values
-    first = {name: x[0] for name, x in values.items()}
-    of = lambda name, x: body_size(
-        grid.scene_factory([*{**first, name: x}.values()]).system
-    )
-    length = body_size(grid.scene_factory([*first.values()]).system)
+    """Return the body's length (N_1, ...) at the points of a grid. Each parameter
+    either multiplies it or does not change it."""
+    first = {name: values[0] for name, values in grid.values.items()}
+
+    def length_at(**changes: float) -> float:
+        point = [*{**first, **changes}.values()]
+        return body_size(grid.scene_factory(point).system)
+
+    length = length_at()
     lengths = np.array(length)
     for name in grid.over:
-        other = next((x for x in values[name] if x != first[name]), first[name])
-        fixed = name == AMPLITUDE or of(name, other) == length
-        along = (
-            np.ones(len(values[name]))
-            if fixed
-            else np.array([of(name, x) for x in values[name]]) / length
-        )
-        lengths = lengths[..., None] * along
+        values = grid.values[name]
+        other = next((value for value in values if value != first[name]), first[name])
+        factors = np.ones(len(values))
+        if name != AMPLITUDE and length_at(**{name: other}) != length:
+            factors = (
+                np.array([length_at(**{name: value}) for value in values]) / length
+            )
+        lengths = lengths[..., None] * factors
     return lengths
 
 
 def _parameters_without_effect(scene: Scene, names) -> tuple[str, ...]:
-    """Return the parameters that change no displacement: the frequency, where no effect has one."""
-    timed = [f"{section}.frequency" for section in ("gait", "physical")]
+    """Return the parameters that change no displacement: the frequency, where no effect
+    depends on it."""
+    if scene.system.traits.frequency is not None:
+        return ()
     return tuple(
-        name
-        for name in names
-        if name in timed and scene.system.traits.frequency is None
+        name for name in names if name in ("gait.frequency", "physical.frequency")
     )
 
 
 def _rows(scenes: list[Scene], amplitudes) -> list:
-    """Return [[x, y, theta, error, error of theta], ...] for all amplitudes of every scene, solved in batches; errors
-    in body lengths and rad."""
-    solve = lambda joined: np.column_stack(
-        estimate.direct(joined, joined.gait, None, joined.numerics.phases)
-    )
+    """Return [[x, y, theta, error, error of theta], ...] for all amplitudes of every
+    scene, solved in batches; errors in body lengths and rad."""
+
+    def solve(joined: Scene) -> np.ndarray:
+        phases = joined.numerics.phases
+        poses, errors = estimate.direct(joined, joined.gait, None, phases)
+        return np.column_stack([poses, errors])
+
     return _solve_in_batches(scenes, amplitudes, solve)
 
 
 def _solve_in_batches(scenes: list[Scene], amplitudes, solve: Callable) -> list:
-    """Return rows of solve(scenes side by side), one for each amplitude of every scene."""
-    groups: dict = {}
+    """Return the rows of solve(joined scene) for the scenes in their order, one for
+    each amplitude of every scene."""
+    groups: dict[str, list[int]] = {}
     for k, scene in enumerate(scenes):
         groups.setdefault(batch_key(scene), []).append(k)
+
     rows: list = [None] * len(scenes)
     for members in groups.values():
-        numbers = solve(joined_scene([scenes[k] for k in members], amplitudes))
-        for k, part in zip(members, np.split(numbers, len(members))):
+        joined = joined_scene([scenes[k] for k in members], amplitudes)
+        solved = np.split(solve(joined), len(members))
+        for k, part in zip(members, solved):
             rows[k] = part.tolist()
     return list(itertools.chain(*rows))
 
 
 def _medium_deviations(joined: Scene) -> np.ndarray:
-    """Return the standard deviations of QUANTITIES by the medium's uncertainty, (N, 4), body lengths and rad."""
-    deviations, length = (
-        uncertainty.medium_spread(joined, joined.gait, None),
-        body_size(joined.system),
-    )
-    return np.column_stack(
-        [deviations[q] / (1.0 if q == "heading" else length) for q in tables.QUANTITIES]
-    )
+    """Return the standard deviations of QUANTITIES by the medium's uncertainty, (N, 4),
+    in body lengths and rad."""
+    deviations = uncertainty.medium_spread(joined, joined.gait, None)
+    length = body_size(joined.system)
+    columns = []
+    for name in tables.QUANTITIES:
+        size = 1.0 if name == "heading" else length
+        columns.append(deviations[name] / size)
+    return np.column_stack(columns)

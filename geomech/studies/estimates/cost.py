@@ -1,7 +1,10 @@
-"""Cost of studies, counted beforehand: force balances and memory of each part of a request, a list of jobs.
+"""Cost of studies: the force balances and the memory of each part of a request, as a
+list of jobs, counted before anything is computed.
 
-Balances are counted as tiers and estimates (`geomech.studies.estimates.estimate`) need them; where time stepping goes on until
-cycles repeat, their number is assumed. Seconds are those of `geomech.run.cost`. From Python nothing is refused: see
+Balances are counted as tiers and error estimates (`geomech.studies.estimates.estimate`) need
+them.
+Where time stepping runs until cycles repeat, the number of cycles is assumed. Seconds
+are those of `geomech.run.cost`. From Python nothing is refused: see
 `SceneTables.cost`."""
 
 from __future__ import annotations
@@ -38,26 +41,25 @@ from geomech.scenes.model import Scene
 from geomech.studies.estimates import effort, estimate, uncertainty
 from geomech.studies.estimates.elements import coarser_systems
 
-SECONDS_PER_CLOSED_FORM = 1e-6  # s of a velocity without balance of forces, measured for built-in systems, assumed for others
-SECONDS_PER_LOOKUP, SECONDS_PER_NUMBER = (
-    2.2e-7,
-    1.1e-9,
-)  # s for each look-up in a table, and for each number that it sums; measured
-ASSUMED_CYCLES = 3  # until they repeat, assumed
-CYCLE_COPIES = (
-    14  # of the angles and velocities of a gait while they are solved and integrated
-)
+# s for each velocity without a balance of forces; measured for built-in systems,
+# assumed for others.
+SECONDS_PER_CLOSED_FORM = 1e-6
+SECONDS_PER_LOOKUP = 2.2e-7  # s for each look-up in a table; measured
+SECONDS_PER_NUMBER = 1.1e-9  # s for each number that a look-up sums; measured
+ASSUMED_CYCLES = 3  # until cycles repeat
+# Copies of a gait's angles and velocities while they are solved and integrated.
+CYCLE_COPIES = 14
 TABLE_COPIES = 4  # of a table while it is built, interpolated and written
-AMPLITUDE_BYTES = (
-    800  # bytes of an amplitude's results by all tiers, as lists and as text
-)
+AMPLITUDE_BYTES = 800  # of an amplitude's results by all tiers, as lists and as text
+STEPPED_NUMBERS = 60  # stored of each element in time stepping; assumed
 
 
 class Job(NamedTuple):
-    """Part of a request.
+    """Part of a request: velocities of one scene.
 
-    count: number of velocities, solved in ``batches``. weight: of one, relative to the scene's system as it is.
-    besides: seconds of other work. memory: bytes at the peak."""
+    count: number of velocities, solved in ``batches``. weight: time of one relative to
+    the scene's system as it is. besides: seconds of other work. memory: bytes at the
+    peak."""
 
     scene: Scene
     count: float
@@ -68,14 +70,12 @@ class Job(NamedTuple):
 
 
 def total_cost(jobs: Sequence[Job]) -> Cost:
-    """Return the cost of jobs that are done one after the other."""
-    balances, seconds, besides = (
-        math.ceil(sum(job.count for job in jobs)),
-        0.0,
-        sum(job.besides for job in jobs),
-    )
+    """Return the cost of jobs that run one after the other."""
+    count = math.ceil(sum(job.count for job in jobs))
     steps = sum(job.batches for job in jobs if job.scene.system.traits.steps)
-    with prefer_backend(Cost(balances, 0.0, 0.0, steps=steps).as_balances):
+    seconds = 0.0
+    besides = sum(job.besides for job in jobs)
+    with prefer_backend(Cost(count, 0.0, 0.0, steps=steps).as_balances):
         for job in jobs:
             system = job.scene.system
             if solver_of(system) is None:
@@ -85,13 +85,8 @@ def total_cost(jobs: Sequence[Job]) -> Cost:
                 seconds += assumed_seconds(
                     job.weight * job.count, points, system.traits.linear, job.batches
                 )
-    return Cost(
-        balances,
-        seconds + besides,
-        max((job.memory for job in jobs), default=BASE),
-        besides,
-        steps,
-    )
+    memory = max((job.memory for job in jobs), default=BASE)
+    return Cost(count, seconds + besides, memory, besides, steps)
 
 
 def study_jobs(
@@ -101,145 +96,164 @@ def study_jobs(
     gait: Gait | None = None,
     tables: bool = True,
 ) -> list[Job]:
-    """Return the jobs of `SceneTables.study` for ``count`` amplitudes of a gait, or the scene's own, by plans of tiers;
-    without tables if these are stored."""
-    gait, phases = gait or scene.gait, scene.numerics.phases
-    jobs, names = [], set()
-    for plan in sorted(plans.values(), key=lambda plan: -plan.numbers):
-        if tables and plan.table and plan.table.name not in names:
-            names.add(plan.table.name)
-            jobs += table_jobs(scene, plan.table, plan.numbers)
-    jobs += frame_jobs(scene) if tables and "connection" not in names else []
-    guesses = [plan for plan in plans.values() if not plan.exact]
-    for plan in guesses:
+    """Return the jobs of `SceneTables.displacements` for ``count`` amplitudes of a
+    gait, or the scene's own, by the plans of tiers. tables: False if these are
+    stored."""
+    gait = gait or scene.gait
+    phases = scene.numerics.phases
+    jobs: list[Job] = []
+    if tables:
+        jobs += _shared_table_jobs(scene, plans)
+
+    inexact = [plan for plan in plans.values() if not plan.exact]
+    for plan in inexact:
         jobs += _lookup_jobs(scene, plan, count, phases)
     jobs += medium_jobs(scene, gait, count)
-    if len(guesses) < len(plans):
-        return jobs + (len(plans) - len(guesses)) * direct_jobs(
-            scene, gait, count, phases
-        )
-    fewer = max(estimate.REFERENCE_PHASES, 8 * gait.harmonics)
-    return jobs + len(guesses) * direct_jobs(
-        scene, gait, min(count, estimate.N_COMPARED), fewer
-    )
+
+    # The errors of look-up tiers are distances from the direct tier: at all amplitudes
+    # if that is asked for, else at some of them.
+    n_exact = len(plans) - len(inexact)
+    if n_exact:
+        return jobs + n_exact * direct_jobs(scene, gait, count, phases)
+    compared = min(count, estimate.N_COMPARED)
+    phases = max(estimate.REFERENCE_PHASES, 8 * gait.harmonics)
+    return jobs + len(inexact) * direct_jobs(scene, gait, compared, phases)
+
+
+def _shared_table_jobs(scene: Scene, plans: Mapping[str, Plan]) -> list[Job]:
+    """Return the jobs of the tables of tiers, each table once, and of the frame's
+    field."""
+    jobs: list[Job] = []
+    names = set()
+    for plan in sorted(plans.values(), key=lambda plan: -plan.numbers):
+        if plan.table and plan.table.name not in names:
+            names.add(plan.table.name)
+            jobs += table_jobs(scene, plan.table, plan.numbers)
+    if "connection" not in names:
+        jobs += frame_jobs(scene)
+    return jobs
 
 
 def prediction_jobs(scene: Scene, plan: Plan, count: int) -> list[Job]:
-    """Return the jobs of a prediction of ``count`` amplitudes by a tier, with its table."""
-    table = table_jobs(scene, plan.table, plan.numbers) if plan.table else []
-    return table + _lookup_jobs(scene, plan, count, scene.numerics.phases)
+    """Return the jobs of a prediction of ``count`` amplitudes by a tier, with its
+    table."""
+    jobs: list[Job] = []
+    if plan.table:
+        jobs += table_jobs(scene, plan.table, plan.numbers)
+    return jobs + _lookup_jobs(scene, plan, count, scene.numerics.phases)
 
 
 def n_balances(plan: Plan, count: int, phases: int) -> int:
-    """Return the number of velocities for a prediction of ``count`` amplitudes at so many phases, with its table."""
-    return (plan.table.balances if plan.table else 0) + plan.balances(count, phases)
+    """Return the number of velocities that a tier solves for ``count`` amplitudes at
+    ``phases`` phases, with its table."""
+    n_table = plan.table.balances if plan.table else 0
+    return n_table + plan.balances(count, phases)
 
 
 def _lookup_jobs(scene: Scene, plan: Plan, count: int, phases: int) -> list[Job]:
     """Return the jobs of a tier besides its table."""
-    if plan.table:
-        return [
-            Job(
-                scene,
-                0,
-                0,
-                besides=(SECONDS_PER_LOOKUP + SECONDS_PER_NUMBER * plan.read)
-                * count
-                * phases,
-            )
-        ]
-    return field_jobs(scene, plan.balances(count, phases), BASE)
+    if not plan.table:
+        return field_jobs(scene, plan.balances(count, phases), BASE)
+    seconds_per_lookup = SECONDS_PER_LOOKUP + SECONDS_PER_NUMBER * plan.read
+    return [Job(scene, 0, 0, besides=seconds_per_lookup * count * phases)]
 
 
 def field_jobs(scene: Scene, count: float, memory: float) -> list[Job]:
-    """Return the jobs of velocities at shapes all over the field."""
+    """Return the jobs of ``count`` velocities at shapes all over the field."""
     return [Job(scene, count, -(-count // SAMPLES_TOGETHER), memory=memory)]
 
 
 def frame_jobs(scene: Scene) -> list[Job]:
-    """Return the jobs of the field that defines a frame, as "minimum-perturbation" has one."""
-    return connection_jobs(scene) if isinstance(scene.system, Framed) else []
+    """Return the jobs of the field that defines a frame such as "minimum-perturbation";
+    none for other frames."""
+    if not isinstance(scene.system, Framed):
+        return []
+    return connection_jobs(scene)
 
 
 def medium_jobs(
-    scene: Scene, gait: Gait, count: int, together: int = sys.maxsize
+    scene: Scene, gait: Gait, count: int, batch_size: int = sys.maxsize
 ) -> list[Job]:
-    """Return the jobs of an uncertain medium for ``count`` amplitudes (`uncertainty.medium_spread`), at most ``together``
-    in a batch."""
+    """Return the jobs of `uncertainty.medium_spread` for ``count`` amplitudes, at most
+    ``batch_size`` in a batch; none for a medium without a covariance."""
     if not uncertainty.is_uncertain(scene.system):
         return []
-    phases, points = (
-        max(uncertainty.PHASES, 8 * gait.harmonics),
-        uncertainty.n_systems(scene.system),
-    )
-    return points * direct_jobs(scene, gait, count, phases, together, checked=False) + (
-        points - 1
-    ) * frame_jobs(scene)
+    phases = max(uncertainty.PHASES, 8 * gait.harmonics)
+    n_systems = uncertainty.n_systems(scene.system)
+    one_system = direct_jobs(scene, gait, count, phases, batch_size, with_error=False)
+    return n_systems * one_system + (n_systems - 1) * frame_jobs(scene)
 
 
 def direct_jobs(
-    scene: Scene, gait: Gait, count: int, phases: int, together: int = sys.maxsize, checked: bool = True,
+    scene: Scene,
+    gait: Gait,
+    count: int,
+    phases: int,
+    batch_size: int = sys.maxsize,
+    with_error: bool = True,
     all_phases: bool = False,
-) -> list[Job]:  # fmt: skip
-    """Return the jobs of the direct tier for ``count`` amplitudes, at most ``together`` in a batch, with its estimate
-    of the error (`estimate.direct`) if ``checked``. all_phases: balances are solved at all phases, at mirror images,
-    too."""
-    system, stepping = scene.system, scene.system.traits.steps
-    if checked:
-        phases = max(estimate.MIN_STEPS if stepping else 32, 8 * -(-phases // 8))
-    group = min(max(1, count), together, gaits_per_batch(system, phases))
-    size = balance_size(system)
-    stored = group * (60 * size.elements + size.memory) if stepping else 0
-    memory = (
-        BASE
-        + 8 * (CYCLE_COPIES * group * phases * (system.joints + 6) + stored)
-        + count * AMPLITUDE_BYTES
-    )
-    solves = (lambda n: n) if all_phases else (lambda n: solved_phases(system, gait, n))
-    runs = _direct_runs(scene, phases) if checked else [(phases, 1.0)]
-    groups, cycles = -(-count // group), n_cycles(system)
-    jobs = [
-        Job(
-            scene,
-            cycles * count * solves(n),
-            groups * (cycles * n if stepping else 1),
-            weight,
-            memory=memory,
-        )
-        for n, weight in runs
-    ]
-    return jobs + (
-        frame_jobs(scene) * groups * (len(runs) - 1)
-        if isinstance(system, Framed)
-        else []
-    )  # other models have frames of their own
+) -> list[Job]:
+    """Return the jobs of the direct tier for ``count`` amplitudes, at most
+    ``batch_size`` in a batch.
+
+    with_error: with the runs that estimate its error (`estimate.direct`). all_phases:
+    all phases are solved, mirror images of others included."""
+    system = scene.system
+    is_stepping = system.traits.steps
+    if with_error:
+        least = estimate.MIN_STEPS if is_stepping else 32
+        phases = max(least, 8 * -(-phases // 8))
+    runs = _direct_runs(scene, phases) if with_error else [(phases, 1.0)]
+
+    group = min(max(1, count), batch_size, gaits_per_batch(system, phases))
+    n_groups = -(-count // group)
+    cycles = n_cycles(system)
+    memory = _direct_memory(system, group, phases) + count * AMPLITUDE_BYTES
+
+    jobs = []
+    for n, weight in runs:
+        solved = n if all_phases else solved_phases(system, gait, n)
+        batches = n_groups
+        if is_stepping:  # the balances of each step are a batch
+            batches *= cycles * n
+        jobs.append(Job(scene, cycles * count * solved, batches, weight, memory=memory))
+    if isinstance(system, Framed):  # other models have frames of their own
+        jobs += frame_jobs(scene) * n_groups * (len(runs) - 1)
+    return jobs
+
+
+def _direct_memory(system: System, n_gaits: int, phases: int) -> float:
+    """Return the bytes that a batch of the direct tier takes."""
+    numbers = CYCLE_COPIES * n_gaits * phases * (system.joints + 6)
+    if system.traits.steps:
+        size = balance_size(system)
+        numbers += n_gaits * (STEPPED_NUMBERS * size.elements + size.memory)
+    return BASE + 8 * numbers
 
 
 def n_cycles(system: System) -> int:
-    """Return the number of cycles that a gait is run for: the setting, one where every cycle differs, else an
-    assumption."""
-    return (
-        ASSUMED_CYCLES
-        if settling(system)
-        else (system.traits.steps and solver_of(system).cycles) or 1
-    )
+    """Return the number of cycles that a gait runs for: assumed where cycles run until
+    they repeat, else the setting of time stepping, or one."""
+    if settling(system):
+        return ASSUMED_CYCLES
+    if system.traits.steps:
+        return solver_of(system).cycles or 1
+    return 1
 
 
 def _direct_runs(scene: Scene, phases: int) -> list[tuple[int, float]]:
-    """Return (phases, weight of a balance) of the runs of `estimate.direct`: time stepping again at a half, a quarter and an
-    eighth of the phases, a quarter with a finer model where there is one, with half and a quarter of the elements of a
-    continuous body likewise, and where effects cut the body, twice as many pieces at a quarter of the phases, and half and
-    a quarter of them at all."""
-    quarter, system = phases // 4, scene.system
+    """Return (phases, weight of a balance) of the runs of `estimate.direct`."""
+    system = scene.system
+    quarter = phases // 4
     runs = [(phases, 1.0)]
-    runs += [(phases // k, 1.0) for k in (2, 4, 8)] if system.traits.steps else []
-    runs += (
-        [(quarter, 2.0), (phases, 0.5), (phases, 0.25)]
-        if pieces_per_length(system)
-        else []
-    )
+    if system.traits.steps:  # fewer phases are other steps
+        runs += [(phases // 2, 1.0), (phases // 4, 1.0), (phases // 8, 1.0)]
+    if pieces_per_length(system):  # twice the pieces, half and a quarter of them
+        runs += [(quarter, 2.0), (phases, 0.5), (phases, 0.25)]
     runs += [(quarter, 1.0 / other.ratio) for other in coarser_systems(system)]
-    return runs + ([(quarter, 1.0)] if refined(system) else [])
+    if refined(system):  # a finer model
+        runs.append((quarter, 1.0))
+    return runs
 
 
 def connection_jobs(scene: Scene) -> list[Job]:
@@ -253,70 +267,76 @@ def harmonic_jobs(scene: Scene) -> list[Job]:
 
 
 def table_jobs(scene: Scene, table: Table, numbers: int = 0) -> list[Job]:
-    """Return the jobs of a table. numbers: stored besides."""
+    """Return the jobs of a table. numbers: stored besides those of the table itself."""
     if table.axes:
         table.axes()  # refuses a field that is too large
-    return field_jobs(
-        scene, table.balances, BASE + 8 * TABLE_COPIES * (table.numbers + numbers)
-    )
+    memory = BASE + 8 * TABLE_COPIES * (table.numbers + numbers)
+    return field_jobs(scene, table.balances, memory)
 
 
 def even_part_jobs(scene: Scene) -> list[Job]:
-    """Return the jobs of the even part of the velocity (`SceneTables.even_part`): at a few shapes, and at all where it is not
-    odd."""
+    """Return the jobs of the even part of the velocity (`SceneTables.even_part`): at a
+    few shapes, and at all of the field where the velocity is not odd."""
     system = scene.system
     if stored_table(system, "connection"):
         return []
-    shapes = math.prod(len(a) for a in fitted.axes(system, scene.numerics))
-    looked_at = EVEN_SHAPES + (0 if system.traits.odd else shapes)
-    return field_jobs(
-        scene,
-        2 * looked_at * EVEN_DIRECTIONS * system.joints,
-        BASE + 8 * TABLE_COPIES * 3 * shapes,
-    )
+    n_shapes = math.prod(len(axis) for axis in fitted.axes(system, scene.numerics))
+    n_solved = EVEN_SHAPES
+    if not system.traits.odd:
+        n_solved += n_shapes
+    count = 2 * n_solved * EVEN_DIRECTIONS * system.joints
+    return field_jobs(scene, count, BASE + 8 * TABLE_COPIES * 3 * n_shapes)
 
 
 def plane_jobs(
-    scene: Scene, pairs: Sequence[tuple[int, int]], at: Sequence
+    scene: Scene, pairs: Sequence[tuple[int, int]], origins: Sequence[np.ndarray]
 ) -> list[Job]:
-    """Return the jobs of planes of pairs of joints through shapes (`SceneTables.plane`)."""
-    balances = [
-        fitted.plane_balances(scene.system, scene.numerics, *one)
-        for one in zip(pairs, at)
-    ]
-    return [job for count in balances for job in field_jobs(scene, count, BASE)]
+    """Return the jobs of planes (`SceneTables.plane`) of pairs of joints, each through
+    the shape of ``origins``."""
+    jobs = []
+    for pair, origin in zip(pairs, origins):
+        count = fitted.plane_balances(scene.system, scene.numerics, pair, origin)
+        jobs += field_jobs(scene, count, BASE)
+    return jobs
 
 
 def metric_jobs(scene: Scene) -> list[Job]:
-    """Return the jobs of the metric, with the harmonic table where they share velocities (`SceneTables.compute_metric`)."""
-    system, n = scene.system, scene.numerics
+    """Return the jobs of the metric (`SceneTables.compute_metric`), with the harmonic
+    table where both come from the same velocities."""
+    system = scene.system
+    numerics = scene.numerics
     if stored_table(system, "metric"):
         return []
     if effort.shares_velocities(system):
-        return table_jobs(scene, effort.shared_table(system, n))
-    rates = (
-        system.joints * (system.joints + 1) // 2
-        if system.traits.linear
-        else harmonic.directions(system, n)
-    )
-    count, numbers = (
-        np.prod([len(a) for a in fitted.axes(system, n)]),
-        max(system.joints**2, effort.HIGHEST_HARMONIC + 1),
-    )
-    return field_jobs(
-        scene, float(count * rates), BASE + 8 * TABLE_COPIES * float(count * numbers)
-    )
+        return table_jobs(scene, effort.shared_table(system, numerics))
+
+    if system.traits.linear:
+        n_rates = system.joints * (system.joints + 1) // 2
+    else:
+        n_rates = harmonic.directions(system, numerics)
+    n_shapes = np.prod([len(axis) for axis in fitted.axes(system, numerics)])
+    n_numbers = max(system.joints**2, effort.HIGHEST_HARMONIC + 1)
+    memory = BASE + 8 * TABLE_COPIES * float(n_shapes * n_numbers)
+    return field_jobs(scene, float(n_shapes * n_rates), memory)
 
 
 def effort_jobs(scene: Scene, count: int, gait: Gait | None = None) -> list[Job]:
-    """Return the jobs of path length and work of ``count`` amplitudes (`effort.effort`): for time stepping again at
-    half and a quarter of the phases, and at a quarter with twice the pieces, or fewer elements of a continuous body."""
-    phases, system = effort.effort_phases(scene), scene.system
-    once = lambda n: direct_jobs(scene, gait or scene.gait, count, n, checked=False)
-    jobs = once(phases)
-    jobs += once(phases // 2) + once(phases // 4) if system.traits.steps else []
+    """Return the jobs of path length and work (`effort.effort`) of ``count`` amplitudes
+    of a gait, or the scene's own, with the runs that estimate their error."""
+    system = scene.system
+    gait = gait or scene.gait
+    phases = effort.effort_phases(scene)
+
+    def run(n: int) -> list[Job]:
+        return direct_jobs(scene, gait, count, n, with_error=False)
+
+    jobs = run(phases)
+    if system.traits.steps:  # fewer phases are other steps
+        jobs += run(phases // 2) + run(phases // 4)
+
     weights = [1.0 / other.ratio for other in coarser_systems(system)]
-    weights += [2.0] if pieces_per_length(system) else []
-    return jobs + [
-        job._replace(weight=weight) for weight in weights for job in once(phases // 4)
-    ]
+    if pieces_per_length(system):  # twice the pieces
+        weights.append(2.0)
+    for weight in weights:
+        jobs += [job._replace(weight=weight) for job in run(phases // 4)]
+    return jobs

@@ -1,14 +1,15 @@
-"""Charts: all that predicts a loop of one scene without solving for forces, as splines over two shape variables.
+"""Charts: splines over two shape variables that predict the displacement of any loop of
+one scene without a balance of forces.
 
 A chart has the tables of the area, path and harmonic tiers, in the scene's frame and in
-the minimum-perturbation frame, in single precision, as a page that is opened anywhere
-looks them up. `tiers` predicts by these numbers alone, with an error; the page of
-`geomech lab` computes the same."""
+the minimum-perturbation frame, in single precision, as the page of `geomech lab` looks
+them up.
+`tiers` predicts from these numbers alone, with an error; the page computes the same."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -28,30 +29,39 @@ from geomech.mathematics.systems.capabilities import Drawable, capability
 from geomech.mathematics.systems.framed import NAME as MINIMUM_PERTURBATION
 from geomech.mathematics.tiers import harmonic
 from geomech.scenes.model import Scene
+from geomech.studies.estimates.estimate import evenly_spaced
 from geomech.studies.scene_tables import SceneTables
 from rft.core.refusal import Refusal, located
 from rft.formulas import se2
 
-SMALLEST_HARMONIC = 1e-7  # of the largest coefficient: harmonics below it are left out
-MAX_ENDS = 33  # points of a body's outline at most
-RESIDUAL_SHARES = (
-    0.35,
-    0.45,
-)  # of what the series leaves along a loop, by which positions and headings of 95 % of loops are off at most
-N_LOOPS = 12  # loops by which the error of the grid, and that between members of a family, are measured
+# Harmonics with smaller coefficients, relative to the largest one, are left out.
+SMALLEST_HARMONIC = 1e-7
+MAX_ENDS = 33  # points of a body's outline
+# Shares of what the series leaves along a loop: for 95 % of loops the errors of
+# position and of heading are smaller. Measured.
+RESIDUAL_SHARES = (0.35, 0.45)
+# Loops by which the error of the grid, and that between members of a family, are
+# measured.
+N_LOOPS = 12
 N_SAMPLES = 64  # of a gait that is no Fourier series
-REACH = 0.85  # of the field on either side, within which those loops have their points
-# of what half the grid changes is the grid's error: of order 2, less than splines of
-# smooth media have
+REACH = (
+    0.85  # share of the field on either side within which those loops have their points
+)
+# Share of the change by half the grid that is the grid's error: of order 2, which is
+# less than the order of splines of smooth media.
 HALF_GRID_SHARE = 0.25
+TABLE_NAMES = ("harmonics", "residual", "outline")
+FRAME_TABLE_NAMES = ("A", "ccf", "ccf_error", "pose")
 
 
 @dataclass(frozen=True, eq=False)
 class FrameTables:
-    """Tables of a body frame. A, ccf: coefficients of splines, (N_1, N_2, 6), columns
-    within rows, and (N_1, N_2, 3). ccf_error: on the grid, (N_1, N_2, 3). pose:
-    coefficients of the frame's pose in the scene's, (N_1, N_2, 3); None for that frame
-    itself."""
+    """Tables of a body frame on a grid of shapes.
+
+    A: spline coefficients of the connection, (N_1, N_2, 6), columns within rows. ccf:
+    of the CCF, (N_1, N_2, 3). ccf_error: values on the grid, (N_1, N_2, 3). pose:
+    spline coefficients of the frame's pose in the scene's frame, (N_1, N_2, 3); None
+    for the scene's frame itself."""
 
     A: np.ndarray
     ccf: np.ndarray
@@ -61,11 +71,12 @@ class FrameTables:
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """Scenes that differ in one parameter: the tables of a chart have a leading axis along it, of spline coefficients.
+    """Scenes that differ in one parameter. The tables of their chart have a leading
+    axis of spline coefficients along it.
 
-    key: of the parameter. values: of the members, ascending, one of them the scene's
-    own. knots, degree: of the spline. error: distance, body lengths, up to which
-    interpolated tables change net positions of `N_LOOPS` loops."""
+    key: of the parameter. values: of the members, ascending, among them ``own``, that
+    of the scene. knots, degree: of the spline. error: largest distance, body lengths,
+    by which interpolated tables change net positions of `N_LOOPS` loops."""
 
     key: str
     values: np.ndarray
@@ -81,12 +92,12 @@ class Chart:
 
     axes: of the grid, rad. knots, degree: of the splines along each axis. harmonics:
     (N_1, N_2, 3 T), of cos beta, sin beta, cos 3 beta ... of each component of xi.
-    residual: on the grid, (N_1, N_2, 3), rms over directions of what they leave.
+    residual: on the grid, (N_1, N_2, 3), rms over directions of what the harmonics
+    leave.
     outline: (N_1, N_2, 2 P), x and y of the ends of links in the scene's frame. frames:
-    by name. grid_error: of position and heading for each rad of a loop's length, that
-    the grid leaves, in the scene's unit and rad. family: None for one scene. between:
-    error of position that interpolation from member to member leaves, in the scene's
-    unit."""
+    tables by name of the frame. grid_error: error of position, in the scene's unit, and
+    of heading, rad, for each rad of a loop's length. family: None for one scene.
+    between: error of position by interpolation between members, in the scene's unit."""
 
     scene: Scene
     axes: tuple[np.ndarray, ...]
@@ -111,54 +122,54 @@ class Chart:
         return self.harmonics.shape[-1] // 3 - 1
 
     def member(self, value: float) -> Chart:
-        """Return the chart of a member of the family, or of a scene between two of them."""
-        if self.family is None:
+        """Return the chart of a member of the family, or of a scene between two of
+        them."""
+        family = self.family
+        if family is None:
             raise Refusal("this chart is that of one scene, and not of a family")
-        f = self.family
-        between = 0.0 if value in f.values else f.error * body_size(self.scene.system)
-        return _map_tables(
-            replace(self, family=None, between=between),
-            lambda x: _spline((f.knots,), (f.degree,), x)([[value]])[0],
-        )
+        between = 0.0
+        if value not in family.values:
+            between = family.error * body_size(self.scene.system)
+
+        def evaluate(coefficients: np.ndarray) -> np.ndarray:
+            spline = _spline((family.knots,), (family.degree,), coefficients)
+            return spline([[value]])[0]
+
+        return _map_tables(replace(self, family=None, between=between), evaluate)
 
     @cached_property
-    def _splines(self) -> dict[tuple, Any]:
-        of = lambda x: _spline(self.knots, (self.degree,) * 2, x)
-        made = {
-            (name, part): of(getattr(t, part))
-            for name, t in self.frames.items()
-            for part in ("A", "ccf")
-        }
-        poses = {
-            (name, "pose"): of(t.pose)
-            for name, t in self.frames.items()
-            if t.pose is not None
-        }
-        areas = {
-            (name, "area"): _area(self.knots, self.degree, t.ccf)
-            for name, t in self.frames.items()
-        }
-        return {**made, **poses, **areas, "harmonics": of(self.harmonics)}
+    def _splines(self) -> dict[Any, Any]:
+        """Splines by (frame, table), and the harmonics by name."""
+        degrees = (self.degree,) * 2
+        splines: dict[Any, Any] = {}
+        for name, tables in self.frames.items():
+            splines[name, "A"] = _spline(self.knots, degrees, tables.A)
+            splines[name, "ccf"] = _spline(self.knots, degrees, tables.ccf)
+            splines[name, "area"] = _area(self.knots, self.degree, tables.ccf)
+            if tables.pose is not None:
+                splines[name, "pose"] = _spline(self.knots, degrees, tables.pose)
+        splines["harmonics"] = _spline(self.knots, degrees, self.harmonics)
+        return splines
 
     def xi(
         self, tier: str, alpha: np.ndarray, alphadot: np.ndarray, frame: str
     ) -> np.ndarray:
-        """Return body velocities (..., 3) by the harmonics, in the scene's frame, or by the connection in another."""
+        """Return body velocities (..., 3): by the connection in ``frame`` for the tier
+        "path", else by the harmonics in the scene's frame."""
         if tier == "path":
             A = self._splines[frame, "A"](alpha).reshape(*alpha.shape[:-1], 3, 2)
             return np.einsum("...ij,...j->...i", A, alphadot)
+
         speed = np.linalg.norm(alphadot, axis=-1)
         unit = alphadot / np.where(speed > 0, speed, 1.0)[..., None]
         series = self._splines["harmonics"](alpha).reshape(*alpha.shape[:-1], 3, -1)
-        return (
-            np.einsum("...ij,...j->...i", series, basis(unit, self.highest))
-            * speed[..., None]
-        )
+        terms = basis(unit, self.highest)
+        return np.einsum("...ij,...j->...i", series, terms) * speed[..., None]
 
 
 class Prediction(NamedTuple):
     """Net pose (3,) of a loop by a tier, in the chosen frame at the start, in the
-    scene's unit and rad; error: of position and heading."""
+    scene's unit and rad. error: of position and of heading."""
 
     net: np.ndarray
     error: tuple[float, float]
@@ -167,63 +178,57 @@ class Prediction(NamedTuple):
 def tiers(
     chart: Chart, gait: Gait, frame: str | None = None, phases: int = 256
 ) -> dict[str, Prediction]:
-    """Return what a chart predicts of a cycle of a gait by the area, the path and the
-    harmonic tier. Refusal for a gait that leaves the chart.
+    """Return the predictions of a chart for a cycle of a gait by the area, the path and
+    the harmonic tier; Refusal for a gait that leaves the chart.
 
     frame: the scene's own if None. phases: of a cycle; the page takes 256.
 
-    The harmonic tier is off by the error of the grid and by a share (`RESIDUAL_SHARES`)
-    of what the series leaves along the loop, the other two by their distance from it,
-    besides."""
+    The error of the harmonic tier is `harmonic_error`. The other two have their
+    distance from the harmonic tier besides."""
     frame = frame or chart.scene.frame
     alpha, alphadot = gait.cycle(phases)
     inside(chart.axes, alpha)
-    net = _in_frame(
-        chart,
-        frame,
-        displacement(chart.xi("harmonic", alpha, alphadot, frame)),
-        alpha[0],
-    )
-    own = harmonic_error(chart, alpha, alphadot)
-    found = {"harmonic": Prediction(net, own)}
-    area = (
-        2 * np.pi * (chart._splines[frame, "area"](alpha) * alphadot[..., 1:]).mean(-2)
-    )
-    others = {
-        "path": displacement(chart.xi("path", alpha, alphadot, frame)),
-        "area": se2.exp(area),
-    }
-    for name, x in others.items():
-        off = np.hypot(*(x - net)[:2]), abs(x[2] - net[2])
-        found[name] = Prediction(x, (float(off[0]) + own[0], float(off[1]) + own[1]))
-    return found
+
+    net = displacement(chart.xi("harmonic", alpha, alphadot, frame))
+    net = _in_frame(chart, frame, net, alpha[0])
+    position_error, heading_error = harmonic_error(chart, alpha, alphadot)
+    predictions = {"harmonic": Prediction(net, (position_error, heading_error))}
+
+    path = displacement(chart.xi("path", alpha, alphadot, frame))
+    potential = chart._splines[frame, "area"](alpha)
+    area = 2 * np.pi * (potential * alphadot[..., 1:]).mean(-2)
+    for name, pose in (("path", path), ("area", se2.exp(area))):
+        distance = np.hypot(*(pose - net)[:2])
+        turn = abs(pose[2] - net[2])
+        error = (float(distance) + position_error, float(turn) + heading_error)
+        predictions[name] = Prediction(pose, error)
+    return predictions
 
 
 def harmonic_error(
     chart: Chart, alpha: np.ndarray, alphadot: np.ndarray
 ) -> tuple[float, float]:
-    """Return the error of the harmonic tier for one cycle (P, 2): of position, and of heading."""
+    """Return the error of the harmonic tier for one cycle (P, 2): of position, in the
+    scene's unit, and of heading, rad.
+
+    It is the error of the grid, and a share (`RESIDUAL_SHARES`) of what the series
+    leaves along the loop."""
     from scipy.interpolate import RegularGridInterpolator
 
-    rms = RegularGridInterpolator(chart.axes, chart.residual)(
-        np.clip(alpha, *np.array([a[[0, -1]] for a in chart.axes]).T)
-    )
+    limits = np.array([axis[[0, -1]] for axis in chart.axes])
+    rms = RegularGridInterpolator(chart.axes, chart.residual)(np.clip(alpha, *limits.T))
     speed = np.linalg.norm(alphadot, axis=-1)
-    along = np.array([speed @ np.hypot(rms[:, 0], rms[:, 1]), speed @ rms[:, 2]]) / len(
-        speed
-    )
-    position, heading = (
-        2
-        * np.pi
-        * (RESIDUAL_SHARES * along + speed.mean() * np.array(chart.grid_error))
-    )
+    along = np.array([speed @ np.hypot(rms[:, 0], rms[:, 1]), speed @ rms[:, 2]])
+    along = along / len(speed)
+    by_grid = speed.mean() * np.array(chart.grid_error)
+    position, heading = 2 * np.pi * (RESIDUAL_SHARES * along + by_grid)
     return float(position) + chart.between, float(heading)
 
 
 def _in_frame(
     chart: Chart, frame: str, net: np.ndarray, start: np.ndarray
 ) -> np.ndarray:
-    """Return a net pose of the scene's frame in another one."""
+    """Return a net pose in the scene's frame as one in another frame."""
     if chart.frames[frame].pose is None:
         return net
     h = chart._splines[frame, "pose"](start)
@@ -239,7 +244,8 @@ def _spline(knots, degrees, coefficients: np.ndarray) -> Any:
 
 
 def _area(knots, degree: int, coefficients: np.ndarray) -> Any:
-    """Return the antiderivative of a spline along the first axis, from its lower end."""
+    """Return the antiderivative of a spline along the first axis, from its lower
+    end."""
     from scipy.interpolate import BSpline
 
     along = BSpline(knots[0], np.asarray(coefficients, float), degree).antiderivative()
@@ -248,7 +254,8 @@ def _area(knots, degree: int, coefficients: np.ndarray) -> Any:
 
 
 def refuse(scene: Scene) -> None:
-    """Refuse a scene of which there is no chart."""
+    """Refuse a scene that has no chart: other than two joints, no harmonics, or no
+    body."""
     system = scene.system
     with located(scene.name):
         if system.joints != 2:
@@ -264,89 +271,90 @@ def refuse(scene: Scene) -> None:
 
 
 def chart(scene: Scene) -> Chart:
-    """Return the chart of a scene. Refusal for one without harmonics, or without a body to draw."""
+    """Return the chart of a scene; Refusal for one without harmonics or without a body
+    to draw."""
     refuse(scene)
     study = SceneTables(scene)
-    fitted, series = study.fitted, _significant_harmonics(study)
+    fitted = study.fitted
+    series = _significant_harmonics(study)
     frames = {scene.frame: _frame_tables(fitted)}
     if scene.frame != MINIMUM_PERTURBATION:
         other = study.in_frame(MINIMUM_PERTURBATION)
-        frames[MINIMUM_PERTURBATION] = _frame_tables(
-            other.fitted, other.scene.system.field.field
-        )
-    field = series.field
-    made = Chart(
+        pose = other.scene.system.field.field
+        frames[MINIMUM_PERTURBATION] = _frame_tables(other.fitted, pose)
+
+    return Chart(
         scene,
         series.axes,
-        tuple(field.spline.t),
+        tuple(series.field.spline.t),
         series.degree,
-        _coefficients(field),
-        _single_precision(_components_last(series.residual)),
-        _coefficients(_outline(scene, series)),
-        frames,
-        (0.0, 0.0),
+        harmonics=_coefficients(series.field),
+        residual=_single_precision(_components_last(series.residual)),
+        outline=_coefficients(_outline(scene, series)),
+        frames=frames,
+        grid_error=_grid_error(series),
     )
-    return replace(made, grid_error=_grid_error(series))
 
 
 def _significant_harmonics(study: SceneTables) -> Harmonics:
-    """Return the harmonics of a scene without those that are next to nothing; where xi = A alphadot, A alone."""
+    """Return the harmonics of a scene up to the last one that is not negligible; where
+    xi = A alphadot, A alone."""
     if study.scene.system.traits.linear:
         A = study.fitted
         return Harmonics(A.axes, A.A, A.residual, A.degree)
     series = study.compute_harmonics()
     size = np.abs(series.coefficients).max((0, 2, 3)).reshape(-1, 2).max(-1)
-    count = 1 + int(np.flatnonzero(size > SMALLEST_HARMONIC * size.max()).max())
+    is_significant = size > SMALLEST_HARMONIC * size.max()
+    count = 1 + int(np.flatnonzero(is_significant).max())
     return replace(series, coefficients=series.coefficients[:, : 2 * count])
 
 
 def _frame_tables(connection: Connection, pose: Field | None = None) -> FrameTables:
-    map_ = ccf(connection)
+    """Return the tables of a frame from its connection. pose: the frame's pose in the
+    scene's frame; None for that frame itself."""
+    density = ccf(connection)
     return FrameTables(
-        _coefficients(connection.field), _coefficients(map_), _single_precision(_components_last(error(connection).values)),
-        None if pose is None else _coefficients(pose),
-    )  # fmt: skip
+        A=_coefficients(connection.field),
+        ccf=_coefficients(density),
+        ccf_error=_single_precision(_components_last(error(connection).values)),
+        pose=None if pose is None else _coefficients(pose),
+    )
 
 
 def _outline(scene: Scene, series: Harmonics) -> Field:
-    """Return the ends of the links in the body frame at every shape of the grid."""
+    """Return the ends of up to `MAX_ENDS` links in the body frame at every shape of the
+    grid."""
     grid = np.stack(np.meshgrid(*series.axes, indexing="ij"), -1)
-    ends = capability(scene.system, Drawable).points(
-        grid, np.zeros((*grid.shape[:2], 3))
-    )
-    some = np.unique(
-        np.linspace(0, ends.shape[-2] - 1, min(MAX_ENDS, ends.shape[-2]))
-        .round()
-        .astype(int)
-    )
-    return Field(
-        series.axes,
-        np.moveaxis(ends[..., some, :].reshape(*grid.shape[:2], -1), -1, 0),
-        series.degree,
-    )
+    at_rest = np.zeros((*grid.shape[:2], 3))
+    ends = capability(scene.system, Drawable).points(grid, at_rest)
+    n_ends = ends.shape[-2]
+    drawn = ends[..., evenly_spaced(n_ends, min(MAX_ENDS, n_ends)), :]
+    values = np.moveaxis(drawn.reshape(*grid.shape[:2], -1), -1, 0)
+    return Field(series.axes, values, series.degree)
 
 
 def loops(
     axes: tuple[np.ndarray, ...], count: int = N_LOOPS, seed: int = 1
 ) -> list[Points]:
     """Return closed curves through random shapes, within a field."""
-    rng, found = np.random.default_rng(seed), []
-    low, high = np.array([(a[0], a[-1]) for a in axes]).T
-    middle, half = (low + high) / 2, (high - low) / 2
-    while len(found) < count:
-        points = middle + REACH * half * rng.uniform(
-            -1, 1, (int(rng.integers(3, 10)), 2)
-        )
+    rng = np.random.default_rng(seed)
+    low, high = np.array([(axis[0], axis[-1]) for axis in axes]).T
+    middle = (low + high) / 2
+    half = (high - low) / 2
+    accepted: list[Points] = []
+    while len(accepted) < count:
+        unit = rng.uniform(-1, 1, (int(rng.integers(3, 10)), 2))
+        points = middle + REACH * half * unit
         gait = Points(points=tuple(map(tuple, points.round(3).tolist())))
         if (np.abs(gait.cycle(256)[0] - middle) < half).all():
-            found.append(gait)
-    return found
+            accepted.append(gait)
+    return accepted
 
 
 def fourier_series(gait: Gait) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the unit curve of a gait as a Fourier series: its mean (2,), and
-    coefficients (cos, sin), (2, K) each; of one that is no series the first terms of
-    its own."""
+    """Return the unit curve of a gait as a Fourier series: its mean (2,), and the
+    coefficients of cos and of sin, (2, K) each. For a gait that is no such series these
+    are the first terms of its curve."""
     if hasattr(gait, "coefficients"):
         return np.zeros(2), *gait.coefficients()
     unit = gait.unit(2 * np.pi * np.arange(N_SAMPLES) / N_SAMPLES)
@@ -355,15 +363,17 @@ def fourier_series(gait: Gait) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _grid_error(series: Harmonics) -> tuple[float, float]:
-    """Return the error of the grid, for each rad of a loop's length, by the harmonics on half of it."""
-    half, rates = series.half(0), []
+    """Return the error of the grid in position and heading for each rad of a loop's
+    length, from the harmonics on half of the grid."""
+    half = series.half(0)
+    rates = []
     for gait in loops(series.axes):
         alpha, alphadot = gait.cycle(256)
-        off = displacement(series.velocity(alpha, alphadot)) - displacement(
-            half.velocity(alpha, alphadot)
-        )
+        net = displacement(series.velocity(alpha, alphadot))
+        difference = net - displacement(half.velocity(alpha, alphadot))
         length = 2 * np.pi * np.linalg.norm(alphadot, axis=-1).mean()
-        rates.append(np.array([np.hypot(*off[:2]), abs(off[2])]) / length)
+        change = np.array([np.hypot(*difference[:2]), abs(difference[2])])
+        rates.append(change / length)
     return tuple((HALF_GRID_SHARE * np.median(rates, 0)).tolist())
 
 
@@ -375,76 +385,80 @@ def family(
     members: list[Chart],
     between: list[Chart],
 ) -> Chart:
-    """Return the charts of scenes that differ in one parameter as one. between: those
-    halfway from member to member, by which the error of interpolation is measured."""
+    """Return the charts of scenes that differ in one parameter as one chart.
+
+    between: charts halfway between neighbouring members, by which the error of
+    interpolation is measured."""
     from scipy.interpolate import make_interp_spline
 
     degree = min(3, len(values) - 1)
+
+    def interpolated(arrays: list[np.ndarray]) -> np.ndarray:
+        """Return the coefficients of the spline along the parameter."""
+        spline = make_interp_spline(values, np.stack(arrays), degree)
+        return _single_precision(spline.c)
+
+    def interpolated_frame(frame: str) -> FrameTables:
+        tables = {}
+        for name in FRAME_TABLE_NAMES:
+            arrays = [getattr(member.frames[frame], name) for member in members]
+            if arrays[0] is not None:
+                tables[name] = interpolated(arrays)
+        return FrameTables(**tables)
+
+    parts = {}
+    for name in TABLE_NAMES:
+        parts[name] = interpolated([getattr(member, name) for member in members])
     knots = make_interp_spline(values, np.asarray(values), degree).t
-    stacked = lambda some: _single_precision(
-        make_interp_spline(values, np.stack(some), degree).c
-    )
-    parts = {
-        name: stacked([getattr(m, name) for m in members])
-        for name in ("harmonics", "residual", "outline")
-    }
-    frames = {
-        frame: FrameTables(*(
-            None if getattr(tables, part) is None else stacked([getattr(m.frames[frame], part) for m in members])
-            for part in ("A", "ccf", "ccf_error", "pose")
-        )) for frame, tables in members[0].frames.items()
-    }  # fmt: skip
-    worst = tuple(np.max([m.grid_error for m in members], 0).tolist())
-    first = members[values.index(own)]
-    made = replace(
-        first,
+    largest_errors = np.max([member.grid_error for member in members], 0)
+    chart = replace(
+        members[values.index(own)],
         **parts,
-        frames=frames,
-        grid_error=worst,
+        frames={frame: interpolated_frame(frame) for frame in members[0].frames},
+        grid_error=tuple(largest_errors.tolist()),
         family=Family(key, np.array(values), knots, degree, own),
     )
-    off = max(
-        _largest_difference(made.member(v), one)
-        for v, one in zip(midpoints(values), between)
-    )
-    return replace(made, family=replace(made.family, error=off))
+
+    differences = []
+    for value, exact in zip(midpoints(values), between):
+        differences.append(_largest_difference(chart.member(value), exact))
+    return replace(chart, family=replace(chart.family, error=max(differences)))
 
 
 def midpoints(values: list[float]) -> list[float]:
-    """Return the values halfway from one to the next."""
+    """Return the values halfway between neighbours."""
     return [(a + b) / 2 for a, b in pairwise(values)]
 
 
-def _largest_difference(one: Chart, other: Chart) -> float:
-    """Return the largest distance, body lengths, between net positions of two charts."""
-    nets = [
-        [tiers(c, gait)["harmonic"].net for gait in loops(one.axes)]
-        for c in (one, other)
-    ]
-    return float(
-        np.hypot(*(np.array(nets[0]) - nets[1])[:, :2].T).max()
-        / body_size(one.scene.system)
-    )
+def _largest_difference(chart: Chart, other: Chart) -> float:
+    """Return the largest distance, body lengths, between net positions of two
+    charts."""
+    gaits = loops(chart.axes)
+    nets = np.array([tiers(chart, gait)["harmonic"].net for gait in gaits])
+    other_nets = np.array([tiers(other, gait)["harmonic"].net for gait in gaits])
+    distances = np.hypot(*(nets - other_nets)[:, :2].T)
+    return float(distances.max() / body_size(chart.scene.system))
 
 
-def _map_tables(chart: Chart, f) -> Chart:
-    """Return the chart with all of its tables through a function."""
-    parts = {
-        name: f(getattr(chart, name)) for name in ("harmonics", "residual", "outline")
-    }
-    of = lambda t: FrameTables(
-        f(t.A), f(t.ccf), f(t.ccf_error), None if t.pose is None else f(t.pose)
-    )
-    return replace(
-        chart, **parts, frames={name: of(t) for name, t in chart.frames.items()}
-    )
+def _map_tables(chart: Chart, function: Callable[[np.ndarray], np.ndarray]) -> Chart:
+    """Return the chart with a function applied to all of its tables."""
+    parts = {name: function(getattr(chart, name)) for name in TABLE_NAMES}
+    frames = {}
+    for frame, tables in chart.frames.items():
+        mapped = {}
+        for name in FRAME_TABLE_NAMES:
+            array = getattr(tables, name)
+            if array is not None:
+                mapped[name] = function(array)
+        frames[frame] = FrameTables(**mapped)
+    return replace(chart, **parts, frames=frames)
 
 
 def _coefficients(field: Field) -> np.ndarray:
-    """Return the coefficients of the spline through a field, components last, (N_1, N_2, K)."""
-    return _single_precision(
-        np.asarray(field.spline.c).reshape(*map(len, field.axes), -1)
-    )
+    """Return the coefficients of the spline through a field, components last,
+    (N_1, N_2, K)."""
+    coefficients = np.asarray(field.spline.c)
+    return _single_precision(coefficients.reshape(*map(len, field.axes), -1))
 
 
 def _components_last(values: np.ndarray) -> np.ndarray:
@@ -452,5 +466,4 @@ def _components_last(values: np.ndarray) -> np.ndarray:
 
 
 def _single_precision(values: np.ndarray) -> np.ndarray:
-    """Return values rounded to single precision."""
     return np.ascontiguousarray(values, np.float32)

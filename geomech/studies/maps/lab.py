@@ -1,4 +1,5 @@
-"""The gait lab: charts of one scene or several, or of a family of scenes, as a request."""
+"""The gait lab: charts of one scene or several, or of a family of scenes, as a
+request."""
 
 from __future__ import annotations
 
@@ -16,10 +17,15 @@ from geomech.studies.maps import charts
 from geomech.studies.maps.charts import Chart
 from rft.core.refusal import Refusal
 
-GALLERY = (  # in which a page shows them
-    "three-link-glass", "three-link-glass-close", "three-link-coulomb", "three-link-viscous", "serpenoid-glass",
+# Scenes that a page shows, in this order.
+GALLERY = (
+    "three-link-glass",
+    "three-link-glass-close",
+    "three-link-coulomb",
+    "three-link-viscous",
+    "serpenoid-glass",
     "seven-link-modes",
-)  # fmt: skip
+)
 N_MEMBERS = range(2, 34)  # of a family
 SECTIONS = ("medium", "body", "system", "physical")  # that a family may vary
 
@@ -28,8 +34,8 @@ SECTIONS = ("medium", "body", "system", "physical")  # that a family may vary
 class Lab:
     """A request for charts of scenes with two shape variables.
 
-    over: values of one parameter of the first scene, {"medium.C": [...]}, which makes that
-    chart one of a family; the scene's own value is added to them."""
+    over: values of one parameter of the first scene, {"medium.C": [...]}, which makes
+    that chart one of a family; the scene's own value is added to them."""
 
     scenes: tuple[Scene, ...]
     over: Mapping[str, Sequence[float]] = field(default_factory=dict)
@@ -43,7 +49,7 @@ class Lab:
 
     @property
     def subject(self) -> Scene:
-        """The scene whose cost is told."""
+        """The scene whose cost is shown."""
         return self.scene
 
     @property
@@ -99,25 +105,30 @@ class Lab:
     @cached_property
     def _values(self) -> list[float]:
         """Values of the members, with the scene's own."""
-        found = sorted(
-            {*next(iter(checked_grid_values(self.over).values())), self._own}
-        )
-        if len(found) not in N_MEMBERS:
+        given, *_ = checked_grid_values(self.over).values()
+        values = sorted({*given, self._own})
+        if len(values) not in N_MEMBERS:
             raise Refusal(
-                f"a family has {N_MEMBERS[0]} to {N_MEMBERS[-1]} members, its own value counted", value=len(found),
-                where="``over``", instead="give fewer or more values",
-            )  # fmt: skip
-        for value in (*found, *charts.midpoints(found)):
-            charts.refuse(self._grid.scene_factory((value,)))
-        return found
+                f"a family has {N_MEMBERS[0]} to {N_MEMBERS[-1]} members, "
+                "its own value counted",
+                value=len(values),
+                where="``over``",
+                instead="give fewer or more values",
+            )
+        for value in (*values, *charts.midpoints(values)):
+            charts.refuse(self._member_scene(value))
+        return values
+
+    def _member_scene(self, value: float) -> Scene:
+        return self._grid.scene_factory((value,))
 
     def cost(self) -> Cost:
-        times = 2 * len(self._values) - 1 if self.over else 1
-        jobs = [
-            job
-            for k, scene in enumerate(self.scenes)
-            for job in (1 if k else times) * _jobs(scene)
-        ]
+        n_family = 1
+        if self.over:  # members, and the scenes halfway between them
+            n_family = 2 * len(self._values) - 1
+        jobs = n_family * _jobs(self.scene)
+        for scene in self.scenes[1:]:
+            jobs += _jobs(scene)
         return cost.total_cost(jobs)
 
     def charts(self, progress: Callable[[float], None]) -> list[Chart]:
@@ -132,28 +143,31 @@ class Lab:
         return found
 
     def _family(self, progress: Callable) -> Chart:
-        values, between = self._values, charts.midpoints(self._values)
-        made = {}
+        """Return the chart of the family of the first scene."""
+        values = self._values
+        between = charts.midpoints(values)
+        by_value = {}
         for value in (*values, *between):
-            made[value] = charts.chart(self._grid.scene_factory((value,)))
-            progress(len(made) / (len(values) + len(between)) / len(self.scenes))
-        some = [made[v] for v in values]
+            by_value[value] = charts.chart(self._member_scene(value))
+            fraction = len(by_value) / (len(values) + len(between))
+            progress(fraction / len(self.scenes))
+
         family = charts.family(
             self.scene,
             next(iter(self.over)),
             values,
             self._own,
-            some,
-            [made[v] for v in between],
+            members=[by_value[value] for value in values],
+            between=[by_value[value] for value in between],
         )
         return replace(family, scene=self.scene)
 
 
 def _jobs(scene: Scene) -> list[cost.Job]:
-    jobs = [
-        *cost.connection_jobs(scene),
-        *([] if scene.system.traits.linear else cost.harmonic_jobs(scene)),
-    ]
+    """Return the jobs of the chart of a scene."""
+    jobs = cost.connection_jobs(scene)
+    if not scene.system.traits.linear:
+        jobs += cost.harmonic_jobs(scene)
     if scene.frame != charts.MINIMUM_PERTURBATION:
         jobs += cost.connection_jobs(scene)  # that of the minimum-perturbation frame
     return jobs

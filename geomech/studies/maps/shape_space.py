@@ -1,4 +1,5 @@
-"""The connection and the CCF of a scene over shape space: on the scene's grid, or on planes where two joints move."""
+"""The connection and the CCF of a scene over shape space: on the scene's grid, or on
+planes where two joints move."""
 
 from __future__ import annotations
 
@@ -24,15 +25,15 @@ from geomech.run.cost import Cost
 from geomech.scenes.model import Scene
 from geomech.studies.estimates.cost import (
     Job,
+    connection_jobs,
     even_part_jobs,
     frame_jobs,
     harmonic_jobs,
     metric_jobs,
     plane_jobs,
+    study_jobs,
     total_cost,
 )
-from geomech.studies.estimates.cost import connection_jobs as fitted
-from geomech.studies.estimates.cost import study_jobs as displacement
 from geomech.studies.estimates.effort import shares_velocities, why_no_metric
 from geomech.studies.maps import fields
 from geomech.studies.maps.fields import WHOLE, has_matrix
@@ -41,8 +42,15 @@ from geomech.studies.tables import COMPONENTS, POSE
 from rft.core.checks import is_whole
 from rft.core.refusal import Refusal, located
 
-NO_MAP_MESSAGE = "a body of one joint has no map, a loop of it encloses no area: give it one joint more, or drop the figure"
+NO_MAP_MESSAGE = (
+    "a body of one joint has no map, a loop of it encloses no area: give it one joint "
+    "more, or drop the figure"
+)
 MAX_PAIRS = 10  # of joints in a figure: as many as five joints have
+ROUNDING = 1e-12  # largest size of a component that is nothing but roundoff
+N_RAYS = 72  # directions from the gait's middle in which the zero line is looked for
+N_STEPS = 200  # places along each
+FIRST_STEP = 0.02  # place on a ray, of its length
 
 
 class ShapeSpace(NamedTuple):
@@ -67,12 +75,13 @@ class ShapeSpace(NamedTuple):
 class Plan:
     """The computation of a connection or a CCF.
 
-    study: the tables of the scene. file: contents of a file, one of `fields.CONTENTS`; ""
-    for none. field: computed on the scene's grid. mapped: drawn on that grid. planes:
-    drawn where two joints move, of ``pair``, such as "1,3" or (1, 3), or of all pairs;
-    held: angles of the other joints, rad, the gait's middle if None. metric: with the cost
-    of changes of shape. stretch: with shape space stretched to that cost. gait: the
-    scene's gait is drawn, and must lie within. other_frame: name of another body frame."""
+    study: the tables of the scene. file: contents of a file, one of `fields.CONTENTS`;
+    "" for none. field: computed on the scene's grid. mapped: drawn on that grid.
+    planes: drawn where two joints move, of ``pair``, such as "1,3" or (1, 3), or of all
+    pairs; held: angles of the other joints, rad, the gait's middle if None. metric:
+    with the cost of changes of shape. stretch: with shape space stretched to that cost.
+    gait: the scene's gait is drawn, and must lie within. other_frame: name of another
+    body frame."""
 
     study: SceneTables
     file: str = ""
@@ -106,51 +115,62 @@ class Plan:
         return self.study.in_frame(self.other_frame)
 
     @property
-    def _costed(self) -> bool:
-        """Whether the metric is computed."""
-        system = self.scene.system
-        needed = {"": False, WHOLE: not why_no_metric(system)}
-        return self.metric or needed.get(self.file, has_matrix(system))
+    def _has_metric(self) -> bool:
+        """Whether the metric is computed: if asked for, or if the file holds one."""
+        if self.metric:
+            return True
+        if not self.file:
+            return False
+        if self.file == WHOLE:
+            return not why_no_metric(self.scene.system)
+        return has_matrix(self.scene.system)
 
     @property
-    def _enclosed(self) -> bool:
+    def _has_area(self) -> bool:
         """Whether the CCF is integrated over the scene's gait."""
         return self.gait and AREA.is_offered(self.scene.system)
 
     @property
-    def _harmonics(self) -> bool:
+    def _has_harmonics(self) -> bool:
         return self.file == WHOLE and is_looked_up(self.scene.system)
 
     @cached_property
-    def at(self) -> list[tuple[tuple[int, int], np.ndarray]]:
+    def pairs_and_origins(self) -> list[tuple[tuple[int, int], np.ndarray]]:
         """Pairs of joints of the planes, from 0, and the shape through which each plane
         goes."""
         if not self.planes:
             return []
         joints = self.scene.system.joints
-        pairs = list(combinations(range(joints), 2))
-        if self.pair is not None:
+        is_single = self.pair is not None
+        if is_single:
             pairs = [_checked_pair(self.pair, joints)]
+        else:
+            pairs = list(combinations(range(joints), 2))
         if len(pairs) > MAX_PAIRS:
             raise Refusal(
                 f"{joints} joints have {len(pairs)} pairs",
-                instead=f"say which, such as ``pair`` 1,{joints}, or give a chain [body] "
-                "modes",
+                instead=f"say which, such as ``pair`` 1,{joints}, "
+                "or give a chain [body] modes",
             )
-        alone = self.pair is not None
-        return [(one, plane_origin(self.scene, one, self.held, alone)) for one in pairs]
+        return [
+            (pair, plane_origin(self.scene, pair, self.held, is_single))
+            for pair in pairs
+        ]
 
     def check(self) -> None:
-        system, name = self.scene.system, self.scene.name
-        with located(name):
+        """Refuse a computation that makes no sense for the scene."""
+        system = self.scene.system
+        with located(self.scene.name):
             refuse(system)
             if (self.mapped or self.planes) and system.joints == 1:
                 raise Refusal(NO_MAP_MESSAGE)
             if self.gait:
                 refuse_outside(self.scene)
-            if self.metric and (reason := why_no_metric(system)):
-                raise Refusal(reason, where=name)
-            if self.other_frame is not None and len(self.at) > 1:
+            if self.metric:
+                reason = why_no_metric(system)
+                if reason:
+                    raise Refusal(reason, where=self.scene.name)
+            if self.other_frame is not None and len(self.pairs_and_origins) > 1:
                 raise Refusal(
                     "``compare_frame`` draws one pair of joints",
                     instead="say which with ``pair``",
@@ -158,56 +178,70 @@ class Plan:
         _ = self.other
 
     def cost(self) -> Cost:
+        jobs = []
         with located(self.scene.name):
-            return total_cost(
-                [
-                    job
-                    for study in filter(None, (self.study, self.other))
-                    for job in self._jobs(study)
-                ]
-            )
+            for study in self._studies:
+                jobs += self._jobs(study)
+            return total_cost(jobs)
+
+    @property
+    def _studies(self) -> list[SceneTables]:
+        """Tables of the scene, and in the other frame if there is one."""
+        if self.other is None:
+            return [self.study]
+        return [self.study, self.other]
 
     def _jobs(self, study: SceneTables) -> list[Job]:
         scene = study.scene
-        jobs = (
-            [*plane_jobs(scene, *zip(*self.at)), *frame_jobs(scene)] if self.at else []
-        )
+        jobs: list[Job] = []
+        if self.pairs_and_origins:
+            pairs, origins = zip(*self.pairs_and_origins)
+            jobs += plane_jobs(scene, pairs, origins) + frame_jobs(scene)
         if not self.field:
             return jobs
-        if self._enclosed and study is self.study:
-            jobs += displacement(
-                scene, {AREA.name: study.plan(AREA.name)}, 1, tables=False
-            )
-        jobs += fitted(scene)
-        if study is self.study:
-            jobs += metric_jobs(scene) if self._costed else []
-            jobs += even_part_jobs(scene) if self.file else []
-            jobs += (
-                harmonic_jobs(scene)
-                if self._harmonics
-                and not (self._costed and shares_velocities(scene.system))
-                else []
-            )
+        if study is not self.study:
+            return jobs + connection_jobs(scene)
+
+        if self._has_area:
+            plans = {AREA.name: study.plan(AREA.name)}
+            jobs += study_jobs(scene, plans, 1, tables=False)
+        jobs += connection_jobs(scene)
+        if self._has_metric:
+            jobs += metric_jobs(scene)
+        if self.file:
+            jobs += even_part_jobs(scene)
+        # The jobs of the metric have the harmonics already where both share velocities.
+        comes_with_metric = self._has_metric and shares_velocities(scene.system)
+        if self._has_harmonics and not comes_with_metric:
+            jobs += harmonic_jobs(scene)
         return jobs
 
     def compute(self, progress: Callable) -> ShapeSpace:
-        """Return what is computed."""
-        study, parts, start = self.study, self._parts(), time.perf_counter()
-        values = [
-            part(lambda done, k=k: progress((k + done) / len(parts)))
-            for k, part in enumerate(parts)
-        ]
-        count = len(self.at)
+        """Compute the planes and the tables. progress: called with the fraction
+        done."""
+        start = time.perf_counter()
+        parts = self._parts()
+        values = []
+        for k, part in enumerate(parts):
+
+            def report(fraction: float, k: int = k) -> None:
+                progress((k + fraction) / len(parts))
+
+            values.append(part(report))
+
+        count = len(self.pairs_and_origins)
         other_planes = ()
         if self.other:
             other_planes = tuple(values[count : 2 * count])
-        stretched = stretch_to_metric(study.metric) if self.stretch else None
+        stretched = None
+        if self.stretch:
+            stretched = stretch_to_metric(self.study.metric)
         enclosed = None
-        if self._enclosed:
+        if self._has_area:
             amplitude = self.scene.gait.amplitude
-            enclosed = study.displacements([amplitude], [AREA.name])
+            enclosed = self.study.displacements([amplitude], [AREA.name])
         return ShapeSpace(
-            study,
+            self.study,
             self.other,
             tuple(values[:count]),
             other_planes,
@@ -218,34 +252,50 @@ class Plan:
         )
 
     def _parts(self) -> list[Callable]:
-        """Return the parts of the computation, in order: planes first."""
-        studies = [self.study, *filter(None, [self.other])]
-        parts: list[Callable] = [
-            lambda progress, s=s, pair=pair, at=at: s.plane(pair, at, progress=progress)
-            for s in studies
-            for pair, at in self.at
-        ]
+        """Return the parts of the computation, functions of a report of progress, in
+        order: planes first."""
+        parts: list[Callable] = []
+        for study in self._studies:
+            for pair, origin in self.pairs_and_origins:
+                parts.append(_plane_computation(study, pair, origin))
         if not self.field:
             return parts
+
         parts.append(self.study.compute_field)
-        parts += [self.study.compute_metric] if self._costed else []
-        parts += [self.study.compute_harmonics] if self._harmonics else []
-        return parts + (
-            [self.other.compute_field] if self.other and not self.at else []
-        )
+        if self._has_metric:
+            parts.append(self.study.compute_metric)
+        if self._has_harmonics:
+            parts.append(self.study.compute_harmonics)
+        if self.other and not self.pairs_and_origins:
+            parts.append(self.other.compute_field)
+        return parts
+
+
+def _plane_computation(
+    study: SceneTables, pair: tuple[int, int], origin: np.ndarray
+) -> Callable[[Callable], Plane]:
+    def compute(progress: Callable) -> Plane:
+        return study.plane(pair, origin, progress=progress)
+
+    return compute
 
 
 def ccf_variables(name: str, planes: Sequence[Plane]) -> list[Variable]:
-    """Return the CCFs of planes as variables NAME_1_3, with their errors, and the shapes
-    through which the planes go, as slice_1_3."""
+    """Return the CCFs of planes as variables such as NAME_1_3, with their errors."""
     found = []
     for plane in planes:
-        dims, ending = plane_dims(plane), joint_suffix(plane)
-        units = fields.component_units(plane.ccf.unit, "rad2")
-        label = f"CCF of joints {plane.pair[0] + 1} and {plane.pair[1] + 1}"
-        error = plane.error.values
-        values = plane.ccf.values
-        found.append(Variable(name + ending, dims, values, units, label, error))
+        ccf = plane.ccf
+        first, second = plane.pair
+        found.append(
+            Variable(
+                name + joint_suffix(plane),
+                plane_dims(plane),
+                ccf.values,
+                fields.component_units(ccf.unit, "rad2"),
+                f"CCF of joints {first + 1} and {second + 1}",
+                plane.error.values,
+            )
+        )
     return found
 
 
@@ -263,14 +313,17 @@ def connection_variables(planes: Sequence[Plane]) -> list[Variable]:
 
 
 def slice_variables(planes: Sequence[Plane]) -> list[Variable]:
-    """Return the axes of planes, and the shapes through which they go."""
-    axes, shapes = {}, []
+    """Return the axes of planes, and the shapes through which they go, such as
+    slice_1_3."""
+    axes: dict[str, np.ndarray] = {}
+    shapes = []
     for plane in planes:
         _, *angles = plane_dims(plane)
         axes.update(zip(angles, plane.connection.axes))
         name = f"slice{joint_suffix(plane)}"
         label = "shape through which the plane goes"
         shapes.append(Variable(name, ("joint",), plane.at, "rad", label))
+
     coordinates = [Variable(name, (name,), axis, "rad") for name, axis in axes.items()]
     joints = np.arange(1, len(planes[0].at) + 1)
     component = Variable("component", ("component",), [*COMPONENTS])
@@ -279,50 +332,57 @@ def slice_variables(planes: Sequence[Plane]) -> list[Variable]:
 
 
 def joint_suffix(plane: Plane) -> str:
+    """Return the ending of names for the joints of a plane, such as _1_3."""
     i, j = plane.pair
     return f"_{i + 1}_{j + 1}"
 
 
 def plane_dims(plane: Plane) -> tuple[str, str, str]:
+    """Return the dimensions of the CCF of a plane."""
     i, j = plane.pair
     return ("component", f"alpha_{i + 1}", f"alpha_{j + 1}")
 
 
-ROUNDING = 1e-12  # largest size of a component that is nothing but roundoff
-N_RAYS = 72  # directions from the gait's middle in which the zero line is looked for
-N_STEPS = 200  # places along each
-FIRST_STEP = 0.02  # place on a ray, of its length
-
-
 def zero_line(ccf: Field, middle: np.ndarray) -> list[Variable]:
-    """Return how far from the gait's middle the x component changes sign: the nearest and
-    the farthest place, and the share of directions in which there is one; nan without
-    any. Nothing for a field with gaps, or one that is zero."""
+    """Return how far from the gait's middle the x component changes sign: the nearest
+    and the farthest place, and the share of directions in which there is one; nan
+    without any. Nothing for a field with gaps, or one that is zero."""
     x = Field(ccf.axes, ccf.values[0], ccf.degree)
     if x.masked or np.abs(x.values).max() < ROUNDING:
         return []
-    reach = min(min(a[-1] - m, m - a[0]) for a, m in zip(x.axes, middle))
-    angles = 2 * np.pi * np.arange(N_RAYS) / N_RAYS
-    steps = np.linspace(FIRST_STEP, 1, N_STEPS) * reach
-    rays = np.stack([np.cos(angles), np.sin(angles)], -1)[:, None] * steps[:, None]
-    changed = np.zeros((N_RAYS, N_STEPS - 1), bool)
-    if x.values.min() < 0 < x.values.max():
-        changed = np.diff(np.sign(x(middle + rays)), axis=1) != 0
-    some = changed.any(1)
+    reach = min(min(axis[-1] - m, m - axis[0]) for axis, m in zip(x.axes, middle))
+    has_zero_line, distances = _sign_changes(x, middle, reach)
     nearest = farthest = np.nan
-    if some.any():
-        first = steps[changed.argmax(1)[some]]
-        nearest, farthest = first.min(), first.max()
+    if has_zero_line.any():
+        nearest, farthest = distances.min(), distances.max()
+
     place = "from the gait's middle to the zero line of x"
     share = "share of directions from the gait's middle with a zero line of x"
+    scalars = (
+        ("zero_line_nearest", nearest, "rad", f"least distance {place}"),
+        ("zero_line_farthest", farthest, "rad", f"largest distance {place}"),
+        ("zero_line_share", has_zero_line.mean(), "1", share),
+        ("zero_line_reach", reach, "rad", "distance that was looked at"),
+    )
     return [
-        Variable("zero_line_nearest", (), nearest, "rad", f"least distance {place}"),
-        Variable(
-            "zero_line_farthest", (), farthest, "rad", f"largest distance {place}"
-        ),
-        Variable("zero_line_share", (), some.mean(), "1", share),
-        Variable("zero_line_reach", (), reach, "rad", "distance that was looked at"),
+        Variable(name, (), value, unit, label) for name, value, unit, label in scalars
     ]
+
+
+def _sign_changes(
+    field: Field, middle: np.ndarray, reach: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return whether a field changes sign along each ray from the middle, (`N_RAYS`,),
+    and the distance, rad, of the first change on the rays that have one."""
+    angles = 2 * np.pi * np.arange(N_RAYS) / N_RAYS
+    steps = np.linspace(FIRST_STEP, 1, N_STEPS) * reach
+    directions = np.stack([np.cos(angles), np.sin(angles)], -1)
+    rays = directions[:, None] * steps[:, None]
+    has_changed = np.zeros((N_RAYS, N_STEPS - 1), bool)
+    if field.values.min() < 0 < field.values.max():
+        has_changed = np.diff(np.sign(field(middle + rays)), axis=1) != 0
+    has_zero_line = has_changed.any(1)
+    return has_zero_line, steps[has_changed.argmax(1)[has_zero_line]]
 
 
 def enclosed_area(area: Result) -> list[Variable]:
@@ -348,6 +408,7 @@ def _checked_pair(pair: Any, joints: int) -> tuple[int, int]:
             )
     elif np.ndim(pair) != 1 or len(pair) != 2 or not all(map(is_whole, pair)):
         raise Refusal("pair must be two joints such as (1, 2)", value=pair)
+
     i, j = (int(x) - 1 for x in names)
     if i == j or not all(0 <= k < joints for k in (i, j)):
         raise Refusal(
@@ -358,38 +419,46 @@ def _checked_pair(pair: Any, joints: int) -> tuple[int, int]:
 
 
 def plane_origin(
-    scene: Scene, pair: tuple[int, int], angles: tuple[float, ...] | None, alone: bool
+    scene: Scene,
+    pair: tuple[int, int],
+    angles: tuple[float, ...] | None,
+    is_single: bool,
 ) -> np.ndarray:
-    """Return the shape through which the plane of a pair of joints goes. alone: angles may be those of the fixed joints
-    only."""
-    at, fixed = (
-        scene.gait.middle.copy(),
-        [k for k in range(scene.system.joints) if k not in pair],
-    )
+    """Return the shape (joints,) through which the plane of a pair of joints goes.
+
+    angles: one for all other joints, or a whole shape; the gait's middle if None.
+    is_single: there is no other plane, so that angles may also be those of the other
+    joints one by one."""
+    origin = scene.gait.middle.copy()
+    fixed = [k for k in range(scene.system.joints) if k not in pair]
     if angles is not None and not fixed:
         raise Refusal(
             "``slice`` says where other joints are held, and this body has but two",
             instead="drop it",
         )
     if angles is None:
-        return at
+        return origin
+
     extent = scene.numerics.extent
-    if not (
-        stored_table(scene.system, "connection")
-        or all(abs(a) <= extent for a in angles)
-    ):
+    has_own_field = stored_table(scene.system, "connection")
+    if not (has_own_field or all(abs(angle) <= extent for angle in angles)):
         raise Refusal(
             f"the angles must lie within the field's {extent:g} rad",
             where="``slice``",
             instead="give others, or raise ``extent``",
         )
-    if len(angles) == len(at) > 1:
+    if len(angles) == len(origin) > 1:
         return np.array(angles)
-    if len(angles) != 1 and not (alone and len(angles) == len(fixed)):
-        choices = f"{len(fixed)} one by one, " * (alone and len(fixed) > 1) + "or "
+
+    is_one_by_one = is_single and len(angles) == len(fixed)
+    if len(angles) != 1 and not is_one_by_one:
+        choices = "or "
+        if is_single and len(fixed) > 1:
+            choices = f"{len(fixed)} one by one, or "
         raise Refusal(
-            f"``slice`` takes one angle for all joints that are held, {choices}{len(at)} for a shape",
+            f"``slice`` takes one angle for all joints that are held, "
+            f"{choices}{len(origin)} for a shape",
             value=len(angles),
         )
-    at[fixed] = angles
-    return at
+    origin[fixed] = angles
+    return origin

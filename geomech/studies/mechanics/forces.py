@@ -74,7 +74,7 @@ def cost(scene: Scene) -> Cost:
     jobs = []
     for one in (scene, *_variants(scene)):
         phases = one.numerics.phases
-        jobs += direct_jobs(_subdivided(one), one.gait, 1, phases, checked=False)
+        jobs += direct_jobs(_subdivided(one), one.gait, 1, phases, with_error=False)
     return total_cost(jobs)
 
 

@@ -244,7 +244,7 @@ def cost_of_table(scene: Scene, cycles: int) -> Cost:
     refuse_cycles(cycles)
     system = scene.system
     phases = scene.numerics.phases
-    jobs = direct_jobs(scene, scene.gait, 1, phases, checked=False)
+    jobs = direct_jobs(scene, scene.gait, 1, phases, with_error=False)
     if system.traits.steps and not settling(system):
         # Each continues the one before; cycles up to the limit cycle are run first.
         assumed = n_cycles(system)

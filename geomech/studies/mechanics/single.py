@@ -14,7 +14,8 @@ from rft.core.refusal import Refusal, formatted
 
 def velocity(system: System, alpha, alphadot) -> list[Variable]:
     """Return the body velocity xi (3,) for one shape (joints,) and its rate, with the
-    residual and the status of the balance of forces; nan where a residual is unknown."""
+    residual and the status of the balance of forces; nan where a residual is
+    unknown."""
     solution = diagnosed_velocity(system, alpha, alphadot)
     unit = length_unit(system)
     residual = solution["residual"]
@@ -40,17 +41,16 @@ def velocity(system: System, alpha, alphadot) -> list[Variable]:
 def diagnosed_velocity(system: System, alpha, alphadot) -> dict:
     """Return {"xi", "status", "residual"} for one shape (joints,) and its rate;
     ValueError if it is singular."""
-    alpha, alphadot = (
-        _checked_numbers(system, name, x)
-        for name, x in (("alpha", alpha), ("alphadot", alphadot))
-    )
+    alpha = _checked_numbers(system, "alpha", alpha)
+    alphadot = _checked_numbers(system, "alphadot", alphadot)
     note_angles(system, np.abs(alpha).max())
     traits = system.traits
     if traits.singularity is not None and not traits.singularity(alpha):
         raise Refusal(
             "the shape is singular", because=traits.singular, instead="move a joint"
         )
-    if (diagnosed := capability(system, Diagnosed)) is not None:
+    diagnosed = capability(system, Diagnosed)
+    if diagnosed is not None:
         return diagnosed.diagnosed(alpha, alphadot)
     return {
         "xi": evaluate(system.velocity, alpha, alphadot).tolist(),
@@ -62,9 +62,13 @@ def diagnosed_velocity(system: System, alpha, alphadot) -> dict:
 def _checked_numbers(system: System, name: str, x) -> np.ndarray:
     """Return x as finite numbers (joints,); ValueError naming it."""
     x = real_array(name, x)
-    if x.shape != (system.joints,) or not np.isfinite(x).all():
-        count = "" if x.shape == (system.joints,) else f"{x.size}: "
+    has_shape = x.shape == (system.joints,)
+    if not has_shape or not np.isfinite(x).all():
+        count = ""
+        if not has_shape:
+            count = f"{x.size}: "
         raise Refusal(
-            f"{name} must be {system.joints} finite numbers for this system, got {count}{formatted(x.tolist())}"
+            f"{name} must be {system.joints} finite numbers for this system, got "
+            f"{count}{formatted(x.tolist())}"
         )
     return x

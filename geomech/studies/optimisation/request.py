@@ -217,7 +217,7 @@ class Request:
             gaits,
             loops.phases,
             gaits_per_cycle,
-            checked=False,
+            with_error=False,
             all_phases=True,
         )
         total = cost.total_cost(jobs)
