@@ -189,13 +189,20 @@ def draw(numbers: dict):
     axes[0, 0].set(xlabel="generation", ylabel="best speed (m/s)", title="search")
     axes[0, 0].legend(title="ground")
     for row, (name, colour) in enumerate(colours.items()):
-        axes[0, 1].bar(
-            np.arange(2) + 0.4 * row - 0.2,
-            numbers["speeds"][row],
-            0.38,
-            color=colour,
-            label=f"for {name}",
-        )
+        speeds = numbers["speeds"][row]
+        x = np.arange(2) + 0.4 * row - 0.2
+        axes[0, 1].bar(x, speeds, 0.38, color=colour, label=f"for {name}")
+        for overturned in x[speeds == 0.0]:
+            # `walk` counts a robot that ends upside down as 0 m/s.
+            axes[0, 1].text(
+                overturned,
+                0.02,
+                "overturns",
+                color=colour,
+                rotation=90,
+                ha="center",
+                va="bottom",
+            )
     axes[0, 1].set(ylabel="speed (m/s)", title="both gaits on both grounds")
     axes[0, 1].set_xticks([0, 1], ["in sand", "on the floor"])
     axes[0, 1].legend()
