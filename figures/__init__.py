@@ -1,8 +1,8 @@
 """Published figures, one importable script each: compute() -> numbers, draw(numbers) ->
 Figure.
 
-`python -m figures.fig11e_displacement [FILE]` draws one to FILE (.png, .pdf or .svg).
-Some have table(numbers) -> text, which is printed. Their common look is in
+`python -m figures.paper.fig11e_displacement [FILE]` draws one to FILE (.png, .pdf or
+.svg). Some have table(numbers) -> text, which is printed. Their common look is in
 `figures.style`.
 """
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from figures import fig11d_ccf, fig11e_displacement, main
+from figures import main
+from figures.paper import fig11d_ccf, fig11e_displacement
 from geomech import plots
 
 

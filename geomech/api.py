@@ -11,24 +11,24 @@ from pathlib import Path
 from typing import Any, Concatenate, ParamSpec
 
 from geomech.core.variables import Result
-from geomech.questions.accuracy import Accuracy
-from geomech.questions.base import Question, options, plain_type, subject_field
-from geomech.questions.ccf import Ccf
-from geomech.questions.connection import Connection
-from geomech.questions.displacement import Displacement
-from geomech.questions.drag_grains import DragGrains
-from geomech.questions.fit_gait import FitGait
-from geomech.questions.fit_medium import FitMedium
-from geomech.questions.forces import Forces
-from geomech.questions.grains import Grains
-from geomech.questions.intrude import Intrude
-from geomech.questions.optimize import Optimize
-from geomech.questions.run import Run
-from geomech.questions.sweep import Sweep
-from geomech.questions.tools import is_film
-from geomech.questions.trajectory import Trajectory
-from geomech.questions.velocity import Velocity
-from geomech.questions.walk import Walk
+from geomech.questions.grains.drag_grains import DragGrains
+from geomech.questions.grains.grains import Grains
+from geomech.questions.measured.fit_gait import FitGait
+from geomech.questions.measured.fit_medium import FitMedium
+from geomech.questions.shared.base import Question, options, plain_type, subject_field
+from geomech.questions.shared.tools import is_film
+from geomech.questions.swimmers.accuracy import Accuracy
+from geomech.questions.swimmers.ccf import Ccf
+from geomech.questions.swimmers.connection import Connection
+from geomech.questions.swimmers.displacement import Displacement
+from geomech.questions.swimmers.forces import Forces
+from geomech.questions.swimmers.optimize import Optimize
+from geomech.questions.swimmers.run import Run
+from geomech.questions.swimmers.sweep import Sweep
+from geomech.questions.swimmers.trajectory import Trajectory
+from geomech.questions.swimmers.velocity import Velocity
+from geomech.questions.terradynamics.intrude import Intrude
+from geomech.questions.terradynamics.walk import Walk
 from geomech.scenes.parts import as_scene
 from geomech.studies.scene_tables import SceneTables
 from rft.core.refusal import Refusal

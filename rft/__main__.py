@@ -13,10 +13,11 @@ from rft import CATALOGUE, Chain, Granular, body_velocity
 from rft.balance.backend import check, preferring
 from rft.laws.records import record
 from rft.terradynamics.ground import Ground
-from rft.terradynamics.meshes import Spatial, shapes
-from rft.terradynamics.meshes import contact as faces
-from rft.terradynamics.meshes.blocks import Blocks
-from rft.terradynamics.meshes.extruded import Extruded
+from rft.terradynamics.meshes import Spatial
+from rft.terradynamics.meshes.forces import contact as faces
+from rft.terradynamics.meshes.forces.blocks import Blocks
+from rft.terradynamics.meshes.forces.extruded import Extruded
+from rft.terradynamics.meshes.surfaces import shapes
 from rft.terradynamics.plates import VERTICAL, CLeg, loads
 from rft.terradynamics.walking import Fineness, Rhex, Tripod, Walker, engine
 
@@ -58,9 +59,9 @@ def compile_faces() -> None:
 
 def compile_mujoco(law: Extruded | Spatial) -> None:
     """Compile the forces of grains in MuJoCo."""
-    from rft.mujoco.compiled import kernel, recorder
-    from rft.mujoco.compiled_parts import element_code
-    from rft.mujoco.compiled_solver import solver_code
+    from rft.mujoco.step.compiled import kernel, recorder
+    from rft.mujoco.step.compiled_parts import element_code
+    from rft.mujoco.step.compiled_solver import solver_code
 
     solver_code()
     kernel()

@@ -170,8 +170,8 @@ def compiled_code():
 
 @pytest.fixture(scope="module")
 def fastest():
-    """Has "auto" take compiled code where it is installed, for marches: tests/test_backend.py compares their digits with
-    those of NumPy."""
+    """Has "auto" take compiled code where it is installed, for marches, whose digits
+    `test_backend.py` compares with those of NumPy."""
     with backend.preferring(backend.fastest()):
         yield
 

@@ -9,83 +9,73 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
+FIGURES = ROOT / "figures"
 DRAWN = ROOT / ".docs" / "generated" / "figures"
-GROUPS = {  # by physics; a script that is not here is found by the build
-    "Force laws": ["fig05c_force_law", "fig06b_plate_stress", "fig07_stress_maps"],
-    "Swimmers of three links": [
-        "fig11c_connection", "fig11d_ccf", "fig11e_displacement", "grains", "readme", "filmstrip", "frames_area", "kinks",
-        "optimal_gaits", "measured_gait",
-    ],
-    "Animals": ["fig09c_efficiency", "fig10_neuromechanics", "transients", "midlines"],
-    "Legs, rods and bodies in grains": ["fig08a_rods", "grain_plates", "fig08b_legs", "ground_effects", "meshes"],
-    "Robots": ["fig12_walking", "walking_mujoco", "walking_sensitivity", "walking_steps", "wheel", "screws", "sand_gaits"],
-    "Accuracy and cost": ["work_precision", "cost_scaling", "effects_cost"],
-}  # fmt: skip
-PICTURES = {  # of scripts whose committed picture has a shorter name
-    "fig06b_plate_stress": "fig06b", "fig07_stress_maps": "fig07", "fig08a_rods": "fig08a", "fig08b_legs": "fig08b",
-    "fig09c_efficiency": "fig09c", "fig10_neuromechanics": "fig10", "fig12_walking": "fig12", "measured_gait": "measured",
-}  # fmt: skip
+GROUPS = {  # headings of the folders, in the order of the page
+    "paper": "Figures of the paper",
+    "swimmers": "Swimmers",
+    "terradynamics": "Bodies in grains",
+    "grains": "Beds of grains",
+    "robots": "Robots",
+    "accuracy": "Accuracy and cost",
+    "": "The picture of the README",
+}
+NO_FIGURES = {"__init__", "style"}
 
 
 def draw_missing() -> None:
     """Draw the figures of which the repository has no picture."""
-    DRAWN.mkdir(parents=True, exist_ok=True)
-    for name in scripts():
-        if not _committed(name).exists():
-            target = DRAWN / f"{name}.png"
-            if (
-                not target.exists()
-                or target.stat().st_mtime
-                < (ROOT / "figures" / f"{name}.py").stat().st_mtime
-            ):
-                env = {**os.environ, "PYTHONPATH": str(ROOT)}
-                command = [sys.executable, "-m", f"figures.{name}", str(target)]
-                subprocess.run(
-                    command, check=True, cwd=ROOT, env=env, stdout=subprocess.DEVNULL
-                )
+    for script in scripts():
+        if script.with_suffix(".png").exists():
+            continue
+        target = _drawn(script)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if target.exists() and target.stat().st_mtime >= script.stat().st_mtime:
+            continue
+        env = {**os.environ, "PYTHONPATH": str(ROOT)}
+        command = [sys.executable, "-m", _module(script), str(target)]
+        subprocess.run(
+            command, check=True, cwd=ROOT, env=env, stdout=subprocess.DEVNULL
+        )
 
 
-def scripts() -> list[str]:
-    """Return the names of all scripts that draw a figure, those of no group last."""
-    found = {path.stem for path in (ROOT / "figures").glob("*.py")} - {
-        "__init__",
-        "style",
-    }
-    grouped = [name for names in GROUPS.values() for name in names]
-    return [name for name in grouped if name in found] + sorted(found - {*grouped})
+def scripts() -> list[Path]:
+    """Return all scripts that draw a figure, in the order of the page."""
+    found = []
+    for folder in GROUPS:
+        found += sorted((FIGURES / folder).glob("*.py"))
+    return [path for path in found if path.stem not in NO_FIGURES]
 
 
 def page() -> str:
-    """Return a section for each group, with title, text, picture and command of every figure."""
-    rest = [
-        name
-        for name in scripts()
-        if not any(name in names for names in GROUPS.values())
-    ]
-    groups = {**GROUPS, **({"Others": rest} if rest else {})}
-    return "\n\n".join(
-        [
-            f"## {title}\n\n" + "\n\n".join(map(_figure, names))
-            for title, names in groups.items()
-        ]
-    )
+    """Return a section for each folder, with title, text, picture and command of every
+    figure."""
+    sections = []
+    for folder, heading in GROUPS.items():
+        of_folder = [x for x in scripts() if x.parent == FIGURES / folder]
+        sections.append(f"## {heading}\n\n" + "\n\n".join(map(_figure, of_folder)))
+    return "\n\n".join(sections)
 
 
-def _committed(name: str) -> Path:
-    return ROOT / "figures" / f"{PICTURES.get(name, name)}.png"
+def _module(script: Path) -> str:
+    return ".".join(script.relative_to(ROOT).with_suffix("").parts)
 
 
-def _figure(name: str) -> str:
-    text = ast.get_docstring(
-        ast.parse((ROOT / "figures" / f"{name}.py").read_text(encoding="utf-8"))
-    )
+def _drawn(script: Path) -> Path:
+    return DRAWN / script.relative_to(FIGURES).with_suffix(".png")
+
+
+def _figure(script: Path) -> str:
+    text = ast.get_docstring(ast.parse(script.read_text(encoding="utf-8"))) or ""
     title, _, about = " ".join(text.partition("\n\n")[0].split()).partition(": ")
     about = about[:1].upper() + about[1:]
-    picture = _committed(name)
-    target = (
-        f"../../figures/{picture.name}"
-        if picture.exists()
-        else f"/generated/figures/{name}.png"
-    )
+    picture = script.with_suffix(".png")
+    if picture.exists():
+        target = f"../../{picture.relative_to(ROOT).as_posix()}"
+    else:
+        drawn = _drawn(script).relative_to(ROOT / ".docs").as_posix()
+        target = f"/{drawn}"
     alt = title.replace("[", "(").replace("]", ")")
-    return f"### {title.rstrip('.')}\n\n{about}\n\n![{alt}]({target})\n\n```sh\npython -m figures.{name}\n```"
+    heading = title.rstrip(".")
+    command = f"```sh\npython -m {_module(script)}\n```"
+    return f"### {heading}\n\n{about}\n\n![{alt}]({target})\n\n{command}"

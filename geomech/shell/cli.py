@@ -61,7 +61,7 @@ def headings() -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     for groups in (questions.GROUPS, describe.GROUPS):
         for heading, names in groups.items():
-            found.setdefault(heading, []).extend(names)
+            found.setdefault(heading, []).extend(map(questions.question_name, names))
     return found
 
 

@@ -10,8 +10,8 @@ from typing import Annotated, Any, NamedTuple, Optional
 
 import typer
 
-from geomech.questions import base
-from geomech.questions.base import Declared, Option, Question
+from geomech.questions.shared import base
+from geomech.questions.shared.base import Declared, Option, Question
 from geomech.shell import pipeline
 from geomech.shell.options import ExtentOption, GridOption, MediumOption
 from rft.core.refusal import Refusal

@@ -11,9 +11,9 @@ from typing import Annotated, Any, Optional
 
 import typer
 
-from geomech.questions import texts
-from geomech.questions.base import SCENE_HELP
-from geomech.questions.names import scene_names
+from geomech.questions.shared import texts
+from geomech.questions.shared.base import SCENE_HELP
+from geomech.questions.shared.names import scene_names
 
 SceneArgument = Annotated[
     str, typer.Argument(metavar="SCENE", help=SCENE_HELP, autocompletion=scene_names)

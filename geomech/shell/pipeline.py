@@ -15,7 +15,7 @@ from geomech.core.errors import Note
 from geomech.core.summary import wrapped
 from geomech.core.variables import Result
 from geomech.io.files import atomic_file, atomic_folder, note, refuse_inputs
-from geomech.questions.base import Question, Run, ignore
+from geomech.questions.shared.base import Question, Run, ignore
 from geomech.results import show
 from geomech.run.backend import prefer_for
 from geomech.run.cost import Cost, decide

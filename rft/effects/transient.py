@@ -22,7 +22,7 @@ SIGN = np.array([1.0, -1.0])[:, None, None]  # of v_n towards the left and the r
 E_FOLDINGS = 3.0
 # Of the flank of a rod 12 mm in diameter that goes to and fro 24.5 mm deep in beds of 6
 # mm grains, by three amplitudes together, with standard errors over three beds
-# (`figures.grains`, topic page on beds of grains).
+# (`figures.grains.beds`, topic page on beds of grains).
 AT_ONCE = 0.15  # +- 0.015; 0.035 at a depth of 15 mm
 AT_ONCE_ALONG = 0.49  # +- 0.015
 RATIO = 0.28  # +- 0.02

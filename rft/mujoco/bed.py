@@ -8,18 +8,18 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
-from rft.mujoco.footprints import Prints
-from rft.mujoco.hills import FLAT, Hills, tangent_plane
-from rft.mujoco.model_parts import last_dof
-from rft.mujoco.parts import Frames
+from rft.mujoco.ground.footprints import Prints
+from rft.mujoco.ground.hills import FLAT, Hills, tangent_plane
+from rft.mujoco.memory.model_parts import last_dof
+from rft.mujoco.step.parts import Frames
 from rft.terradynamics.ground import Ground
-from rft.terradynamics.meshes.blocks import Blocks
-from rft.terradynamics.meshes.contact import Face, Motion, faces
-from rft.terradynamics.meshes.extruded import Extruded
+from rft.terradynamics.meshes.forces.blocks import Blocks
+from rft.terradynamics.meshes.forces.contact import Face, Motion, faces
+from rft.terradynamics.meshes.forces.extruded import Extruded
+from rft.terradynamics.meshes.forces.law import Spatial
+from rft.terradynamics.meshes.forces.zones import Place, Zones, share_in
 from rft.terradynamics.meshes.geoms import geom_label
-from rft.terradynamics.meshes.law import Spatial
-from rft.terradynamics.meshes.mesh import Mesh
-from rft.terradynamics.meshes.zones import Place, Zones, share_in
+from rft.terradynamics.meshes.surfaces.mesh import Mesh
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class BedGeoms:
 
     def poses(self, data) -> tuple[np.ndarray, np.ndarray]:
         """Return rotations from the geoms' axes to the world, (G, 3, 3), and places of
-        their origins, (G, 3), m. data: MjData or `rft.mujoco.addresses.Arrays`."""
+        their origins, (G, 3), m. data: MjData or `rft.mujoco.memory.addresses.Arrays`."""
         return data.geom_xmat[self.ids].reshape(-1, 3, 3), data.geom_xpos[self.ids]
 
 
@@ -162,7 +162,7 @@ class Bed:
         return self.prints.userdata_size if self.prints else 0
 
     def frames(self, data) -> Frames:
-        """Return where the geoms are. data: MjData or `rft.mujoco.addresses.Arrays`."""
+        """Return where the geoms are. data: MjData or `rft.mujoco.memory.addresses.Arrays`."""
         turn, place = self.geoms.poses(data)
         middles = place + np.einsum("gij,gj->gi", turn, self.geoms.spheres[:, :3])
         up, level = self.surface.planes(middles)

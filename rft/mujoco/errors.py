@@ -13,8 +13,8 @@ import numpy as np
 
 from rft.mujoco import installed
 from rft.mujoco.bed import Bed
-from rft.terradynamics.meshes.blocks import Blocks
-from rft.terradynamics.meshes.contact import faces
+from rft.terradynamics.meshes.forces.blocks import Blocks
+from rft.terradynamics.meshes.forces.contact import faces
 from rft.terradynamics.meshes.geoms import mesh_of_elements
 
 # A difference d of runs at lengths h and h / 2 leaves the error d / (1 - 2^-p) of the

@@ -22,11 +22,15 @@ import numpy as np
 from rft.balance.backend import Note, compiles
 from rft.core.refusal import require
 from rft.mujoco import numpy_step
-from rft.mujoco.addresses import check_places, full_m_takes_data, functions, places
 from rft.mujoco.bed import Bed
-from rft.mujoco.footprints import Prints
-from rft.mujoco.implicit import ACCURACY, COARSER, UNSOLVED, Result
-from rft.mujoco.layout import (
+from rft.mujoco.ground.footprints import Prints
+from rft.mujoco.memory.addresses import (
+    check_places,
+    full_m_takes_data,
+    functions,
+    places,
+)
+from rft.mujoco.memory.layout import (
     COARSER_STEPS,
     GEOM,
     ITERATIONS,
@@ -42,8 +46,9 @@ from rft.mujoco.layout import (
     WATCHED_ROUNDING,
     WATCHED_STATUS,
 )
-from rft.mujoco.model_parts import ModelParts
-from rft.terradynamics.meshes.contact import record
+from rft.mujoco.memory.model_parts import ModelParts
+from rft.mujoco.step.implicit import ACCURACY, COARSER, UNSOLVED, Result
+from rft.terradynamics.meshes.forces.contact import record
 
 ROWS = 4096  # beds of sand at one time
 # Layouts of detached beds that are kept, for a step of another thread that is still
@@ -56,7 +61,7 @@ TABLE = np.zeros((ROWS + 1, 3), np.int64)
 
 class Layout(NamedTuple):
     """What compiled code reads of a bed: `numbers`, int64, hold sizes and the addresses
-    of the arrays, which are kept by name (`rft.mujoco.layout`)."""
+    of the arrays, which are kept by name (`rft.mujoco.memory.layout`)."""
 
     numbers: np.ndarray
     arrays: dict[str, np.ndarray]
@@ -81,7 +86,7 @@ class Effort(NamedTuple):
 class Observation(NamedTuple):
     """What the grains do in one step.
 
-    residual, status, rounding: as of `rft.mujoco.implicit.Result`. wrenches, twists:
+    residual, status, rounding: as of `rft.mujoco.step.implicit.Result`. wrenches, twists:
     (G, 6), along the geoms' axes, at the end of the step."""
 
     residual: float
@@ -136,7 +141,7 @@ def install(model: mujoco.MjModel, bed: Bed) -> int:
         shapes = parts.shape_numbers(bed.geoms.ids)
         _entries[row] = Entry(parts, bed, shapes, layout, counts, largest, finalizer)
         if layout:
-            from rft.mujoco.compiled import kernel
+            from rft.mujoco.step.compiled import kernel
 
             TABLE[row, 1] = kernel().address
             TABLE[row, 2] = layout.numbers.ctypes.data
@@ -261,7 +266,7 @@ atexit.register(_clear_callback)
 @functools.cache
 def _compiled_callback() -> tuple:
     """Return the compiled callback and the code that it lives in."""
-    from rft.mujoco.compiled import dispatcher
+    from rft.mujoco.step.compiled import dispatcher
 
     code = dispatcher(TABLE)
     return code.ctypes, code
@@ -372,7 +377,7 @@ def layout_of(
 ) -> Layout:
     """Return the layout of a bed under a model, whose steps write `Entry.counts` and
     `Entry.largest`."""
-    from rft.mujoco.compiled import kernel
+    from rft.mujoco.step.compiled import kernel
 
     kernel()
     arrays = _bed_arrays(parts, bed)
@@ -483,8 +488,8 @@ def _data_places() -> dict[str, int]:
 def _function_addresses(bed: Bed) -> dict[str, int]:
     """Return the addresses of the functions that a step calls: compiled code for the
     bed's laws, reports in Python and MuJoCo's own."""
-    from rft.mujoco.compiled_parts import element_code
-    from rft.mujoco.compiled_solver import solver_code
+    from rft.mujoco.step.compiled_parts import element_code
+    from rft.mujoco.step.compiled_solver import solver_code
 
     return functions() | {
         "element_code": element_code(_law_record_class(bed)).address,
@@ -496,7 +501,7 @@ def _function_addresses(bed: Bed) -> dict[str, int]:
 
 def _print_numbers(parts: ModelParts, prints: Prints) -> dict[str, int]:
     """Return the numbers of a layout by which footprints are remembered."""
-    from rft.mujoco.compiled import recorder
+    from rft.mujoco.step.compiled import recorder
 
     rows, columns = prints.shape
     return {

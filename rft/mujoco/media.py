@@ -18,8 +18,8 @@ from rft.fits.plates import StressFit, ZetaFit
 from rft.laws import CATALOGUE
 from rft.mujoco import installed
 from rft.mujoco.bed import Bed
-from rft.terradynamics.meshes.extruded import Extruded
-from rft.terradynamics.meshes.law import Spatial
+from rft.terradynamics.meshes.forces.extruded import Extruded
+from rft.terradynamics.meshes.forces.law import Spatial
 from rft.terradynamics.plates import VERTICAL, PlateStress, StressMap
 from rft.terradynamics.plates.stress import COEFFICIENTS
 

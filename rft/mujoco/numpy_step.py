@@ -1,5 +1,5 @@
 """The forces of the grains in a step by NumPy, at the address of an mjData, as
-`rft.mujoco.compiled` computes them."""
+`rft.mujoco.step.compiled` computes them."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ import ctypes
 import mujoco
 import numpy as np
 
-from rft.mujoco.addresses import Arrays, full_m_takes_data, functions
 from rft.mujoco.bed import Bed
-from rft.mujoco.equations import (
+from rft.mujoco.memory.addresses import Arrays, full_m_takes_data, functions
+from rft.mujoco.memory.model_parts import ModelParts
+from rft.mujoco.step.equations import (
     FASTEST,
     IMPLICIT,
     IMPLICIT_FAST,
@@ -21,10 +22,9 @@ from rft.mujoco.equations import (
     elliptic_rows,
     solve_blocks,
 )
-from rft.mujoco.implicit import ACCURACY, Result
-from rft.mujoco.model_parts import ModelParts
-from rft.mujoco.parts import cut
-from rft.mujoco.rows import Rows
+from rft.mujoco.step.implicit import ACCURACY, Result
+from rft.mujoco.step.parts import cut
+from rft.mujoco.step.rows import Rows
 
 POINTER = ctypes.c_void_p
 
@@ -32,7 +32,7 @@ POINTER = ctypes.c_void_p
 def add_forces(bed: Bed, parts: ModelParts, data: int):
     """Add the forces of the grains to qfrc_passive of the mjData at an address.
 
-    Returns (result, geom, wrenches, twists) of `rft.mujoco.equations.solve_blocks`;
+    Returns (result, geom, wrenches, twists) of `rft.mujoco.step.equations.solve_blocks`;
     None where no geom is in the ground."""
     arrays = Arrays(data, parts.sizes)
     frames = bed.frames(arrays)

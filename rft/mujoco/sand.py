@@ -18,18 +18,18 @@ from rft.core.refusal import Refusal, formatted, located, require
 from rft.mujoco import installed
 from rft.mujoco.bed import Bed, Surface
 from rft.mujoco.errors import Control, RunError, error_of_run
-from rft.mujoco.floor import (
+from rft.mujoco.ground.floor import (
     Exclusion,
     apply_exclusion,
     exclude_floor_contacts,
     floors,
     restore_floor_contacts,
 )
-from rft.mujoco.footprints import FORM, Footprints, Prints
-from rft.mujoco.hills import FLAT, Hills, hills_of
+from rft.mujoco.ground.footprints import FORM, Footprints, Prints
+from rft.mujoco.ground.hills import FLAT, Hills, hills_of
+from rft.mujoco.ground.regions import parse_zones
+from rft.mujoco.ground.selection import choose_geoms, overlap_note
 from rft.mujoco.media import Media, law_of, require_one_form, sample
-from rft.mujoco.regions import parse_zones
-from rft.mujoco.selection import choose_geoms, overlap_note
 from rft.mujoco.sinkage import sinkage
 from rft.terradynamics.ground import (
     Ground,
@@ -38,10 +38,10 @@ from rft.terradynamics.ground import (
     checked_effects,
     ground_of,
 )
-from rft.terradynamics.meshes.extruded import Extruded
+from rft.terradynamics.meshes.forces.extruded import Extruded
+from rft.terradynamics.meshes.forces.law import Spatial
 from rft.terradynamics.meshes.geoms import geom_label, geom_name, mesh_of_elements
-from rft.terradynamics.meshes.law import Spatial
-from rft.terradynamics.meshes.mesh import Mesh
+from rft.terradynamics.meshes.surfaces.mesh import Mesh
 from rft.terradynamics.plates import StressMap
 
 __all__ = ["Footprints", "Sand", "attach", "sample"]
@@ -325,7 +325,7 @@ def attach(
         by `Sand.batch`.
     medium : str, StressMap or Spatial
         Name in `rft.terradynamics.plates.VERTICAL` or a stress map of the vertical
-        plane, extended to three dimensions by `rft.terradynamics.meshes.extruded`; or a
+        plane, extended to three dimensions by `rft.terradynamics.meshes.forces.extruded`; or a
         law of three dimensions.
     geoms : str, int or list of these
         Names of the geoms in the sand or of their bodies, patterns such as "leg*" and

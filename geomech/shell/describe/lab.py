@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Optional
 import typer
 
 from geomech.core.summary import wrapped
-from geomech.questions.loading import load_scenes
-from geomech.questions.names import scene_names
-from geomech.questions.texts import parameters
+from geomech.questions.shared.loading import load_scenes
+from geomech.questions.shared.names import scene_names
+from geomech.questions.shared.texts import parameters
 from geomech.shell import pipeline, terminal
 from geomech.shell.options import YesOption
 from rft.core.refusal import in_line

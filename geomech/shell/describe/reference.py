@@ -7,7 +7,7 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.questions.names import section_names
+from geomech.questions.shared.names import section_names
 from geomech.shell import terminal
 from geomech.shell.options import PluginOption, load_plugins
 from rft.core.refusal import Refusal

@@ -7,7 +7,7 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.questions.names import printable_names
+from geomech.questions.shared.names import printable_names
 from geomech.shell import terminal
 
 

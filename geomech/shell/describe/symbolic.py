@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from geomech.core.variables import COMPONENTS
-from geomech.questions.loading import load_scene
+from geomech.questions.shared.loading import load_scene
 from geomech.shell import terminal
 from geomech.shell.options import SceneArgument
 from rft.core.refusal import located

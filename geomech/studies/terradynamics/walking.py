@@ -25,8 +25,8 @@ from geomech.studies.settings import Measurements
 from rft.core.metres import GRAVITY
 from rft.core.refusal import Refusal, located
 from rft.terradynamics.walking import Mjcf, Rhex, Roller, Walk, engine
-from rft.terradynamics.walking.stride import MOST_STRIDES
-from rft.terradynamics.walking.stride import NEAR as NEAR
+from rft.terradynamics.walking.planar.stride import MOST_STRIDES
+from rft.terradynamics.walking.planar.stride import NEAR as NEAR
 
 PILOT = 0.05  # s of time steps that are timed
 STATUSES = ("walking", "stuck", "sunk", "flipped", "airborne")

@@ -1,10 +1,8 @@
 """Forces of grains on bodies of any form in three dimensions: the law, triangle meshes,
 and their motions."""
 
-from rft.terradynamics.meshes.files import read
+from rft.terradynamics.meshes.forces.law import Spatial
 from rft.terradynamics.meshes.intrusion import Faces, Wrench, bearing, wrench
-from rft.terradynamics.meshes.law import Spatial
-from rft.terradynamics.meshes.mesh import Mesh, below
 from rft.terradynamics.meshes.motions import (
     MOTIONS,
     Drag,
@@ -23,7 +21,9 @@ from rft.terradynamics.meshes.solids import (
     Solid,
     Sphere,
 )
-from rft.terradynamics.meshes.sound import Sound, sound
+from rft.terradynamics.meshes.surfaces.files import read
+from rft.terradynamics.meshes.surfaces.mesh import Mesh, below
+from rft.terradynamics.meshes.surfaces.sound import Sound, sound
 
 __all__ = [
     "MOTIONS",

@@ -11,11 +11,11 @@ from scipy.spatial import ConvexHull, QhullError
 
 from rft.balance.backend import Note
 from rft.core.refusal import Refusal, formatted, located, require
-from rft.terradynamics.meshes import shapes, widened
-from rft.terradynamics.meshes.merged import resize_faces
-from rft.terradynamics.meshes.mesh import Mesh
-from rft.terradynamics.meshes.smooth import smooth
-from rft.terradynamics.meshes.sound import size_note, sound
+from rft.terradynamics.meshes.surfaces import shapes, widened
+from rft.terradynamics.meshes.surfaces.merged import resize_faces
+from rft.terradynamics.meshes.surfaces.mesh import Mesh
+from rft.terradynamics.meshes.surfaces.smooth import smooth
+from rft.terradynamics.meshes.surfaces.sound import size_note, sound
 
 MOST_FACES = 200_000  # of a geom's mesh, as in an STL file that MuJoCo takes
 MOST_ELEMENTS = 100_000  # of a geom
@@ -40,7 +40,7 @@ def mesh_of_elements(
     length: m, of the edges, about; None for as many triangles as the shape of the geom
     needs, with which 90 % of random motions have an error of the force below 3 %, and
     none has one above 6 %. Of a mesh geom, triangles that are larger are halved, and
-    those that are smaller are merged (`rft.terradynamics.meshes.merged`). share: factor
+    those that are smaller are merged (`rft.terradynamics.meshes.surfaces.merged`). share: factor
     of the lengths of edges where ``length`` is None. hulls: whether the convex hull
     stands for a mesh without an inside."""
     kind = geom_kind(model, geom)

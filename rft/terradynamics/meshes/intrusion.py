@@ -1,5 +1,5 @@
 """Force and moment of grains on a rigid mesh in any motion: the law of
-`rft.terradynamics.meshes.law` face by face (`rft.terradynamics.meshes.contact`).
+`rft.terradynamics.meshes.forces.law` face by face (`rft.terradynamics.meshes.forces.contact`).
 
 The error is of order 2 in the size of triangles where the surface is smooth and
 neighbouring triangles meet at less than the medium's ``grazing`` angle.
@@ -15,10 +15,15 @@ import numpy as np
 from rft.core.checks import real_array, unmasked
 from rft.core.refusal import require
 from rft.terradynamics.ground import Ground, GroundEffect, ground_of
-from rft.terradynamics.meshes.contact import Motion, Part, load, velocity_of_middle
-from rft.terradynamics.meshes.law import Spatial
-from rft.terradynamics.meshes.mesh import Mesh, below
-from rft.terradynamics.meshes.submerged import submerged_part
+from rft.terradynamics.meshes.forces.contact import (
+    Motion,
+    Part,
+    load,
+    velocity_of_middle,
+)
+from rft.terradynamics.meshes.forces.law import Spatial
+from rft.terradynamics.meshes.forces.submerged import submerged_part
+from rft.terradynamics.meshes.surfaces.mesh import Mesh, below
 
 
 class Wrench(NamedTuple):

@@ -17,7 +17,7 @@ import numpy as np
 from rft.core.checks import Number, check_numbers, real_array
 from rft.core.metres import LARGEST, metres
 from rft.core.refusal import Refusal, require
-from rft.terradynamics.meshes.mesh import Mesh
+from rft.terradynamics.meshes.surfaces.mesh import Mesh
 from rft.terradynamics.prescribed import (
     FARTHEST,
     Depth,

@@ -12,16 +12,16 @@ import numpy as np
 from rft.core.checks import Number, check_numbers, in_range
 from rft.core.metres import metres
 from rft.core.refusal import require
-from rft.terradynamics.meshes import shapes
-from rft.terradynamics.meshes.blade import blade
-from rft.terradynamics.meshes.files import read
-from rft.terradynamics.meshes.mesh import (
+from rft.terradynamics.meshes.surfaces import shapes
+from rft.terradynamics.meshes.surfaces.blade import blade
+from rft.terradynamics.meshes.surfaces.files import read
+from rft.terradynamics.meshes.surfaces.mesh import (
     MOST_TRIANGLES,
     Mesh,
     mirror_image,
     quartered_mesh,
 )
-from rft.terradynamics.meshes.smooth import smooth
+from rft.terradynamics.meshes.surfaces.smooth import smooth
 
 # Triangles of the finest mesh in studies of accuracy, which stands for the exact
 # surface.

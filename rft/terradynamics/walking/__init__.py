@@ -3,7 +3,7 @@ and screws at a given slip."""
 
 from rft.terradynamics.walking.craft import Screws
 from rft.terradynamics.walking.engines import ENGINES, Fineness, Walker, engine
-from rft.terradynamics.walking.mjcf import Mjcf
+from rft.terradynamics.walking.planar.stride import Walk
 from rft.terradynamics.walking.robot import Rhex, Robot, Roller, Tripod
 from rft.terradynamics.walking.screws import (
     Cruise,
@@ -12,7 +12,7 @@ from rft.terradynamics.walking.screws import (
     free_turning,
     turning,
 )
-from rft.terradynamics.walking.stride import Walk
+from rft.terradynamics.walking.spatial.mjcf import Mjcf
 from rft.terradynamics.walking.wheel import Rolling, rolling
 
 ROBOTS: dict[str, type[Robot]] = {

@@ -12,7 +12,8 @@ import numpy as np
 from rft.core.checks import check_numbers
 from rft.core.metres import LARGEST, metres
 from rft.core.refusal import formatted, require
-from rft.terradynamics.meshes import Mesh, Screw, shapes
+from rft.terradynamics.meshes import Mesh, Screw
+from rft.terradynamics.meshes.surfaces import shapes
 from rft.terradynamics.walking.robot import Mass, Robot
 
 PAIRS = ("mirrored", "alike")

@@ -11,10 +11,10 @@ from typing import Annotated, NamedTuple, Protocol
 from rft.core.checks import Number, check_numbers
 from rft.core.refusal import Refusal, formatted, require
 from rft.terradynamics.ground import Ground, GroundEffect, checked_effects, ground_of
-from rft.terradynamics.meshes.law import Spatial
+from rft.terradynamics.meshes.forces.law import Spatial
 from rft.terradynamics.plates.stress import PlateStress
+from rft.terradynamics.walking.planar.stride import Walk, compute_stride
 from rft.terradynamics.walking.robot import SMALLEST_ROUNDING, Robot, Tripod
-from rft.terradynamics.walking.stride import Walk, compute_stride
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ class Engine(Protocol):
 
         A walk lasts ``cycles`` cycles, by default the duration of the numerics, or
         until the robot's end. progress: receives the finished fraction. advance:
-        computes a stride, as `rft.terradynamics.walking.stride.compute_stride`."""
+        computes a stride, as `rft.terradynamics.walking.planar.stride.compute_stride`."""
         ...
 
     def rerun(

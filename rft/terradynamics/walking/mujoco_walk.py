@@ -5,9 +5,9 @@ takes `SUBSTEPS` steps for each time step, and cuts an element of a leg or belly
 `PIECES`, which makes both errors as small as those of the planar engine.
 
 A robot of the vertical plane becomes a hull on legs at both sides that is free to roll,
-yaw and drift (`rft.terradynamics.walking.hexapod`); a custom MJCF is used as it is. A
+yaw and drift (`rft.terradynamics.walking.spatial.hexapod`); a custom MJCF is used as it is. A
 walk ends with the stride that repeats the last one. `Simulation` computes strides by
-`rft.terradynamics.walking.multibody`.
+`rft.terradynamics.walking.spatial.multibody`.
 """
 
 from __future__ import annotations
@@ -22,28 +22,15 @@ import mujoco
 import numpy as np
 
 from rft.motion import limit_cycle
-from rft.terradynamics.meshes.extruded import Extruded
-from rft.terradynamics.meshes.law import Spatial
+from rft.terradynamics.meshes.forces.extruded import Extruded
+from rft.terradynamics.meshes.forces.law import Spatial
 from rft.terradynamics.walking.engines import (
     Fineness,
     Variation,
     Walker,
     with_more_elements,
 )
-from rft.terradynamics.walking.facets import Facets, Grains
-from rft.terradynamics.walking.machine import (
-    FREE,
-    HINGE,
-    JOINT,
-    SLIDE,
-    Clock,
-    build_machine,
-    set_servo_damping,
-)
-from rft.terradynamics.walking.mjcf import Mjcf
-from rft.terradynamics.walking.multibody import SUBSTEPS, Multibody
-from rft.terradynamics.walking.robot import intervals, walking_rounding
-from rft.terradynamics.walking.stride import (
+from rft.terradynamics.walking.planar.stride import (
     AVERAGED_CYCLES,
     MOST_STRIDES,
     REMAINING_CHANGE,
@@ -53,6 +40,19 @@ from rft.terradynamics.walking.stride import (
     compute_stride,
     cycles_to_settle,
 )
+from rft.terradynamics.walking.robot import intervals, walking_rounding
+from rft.terradynamics.walking.spatial.facets import Facets, Grains
+from rft.terradynamics.walking.spatial.machine import (
+    FREE,
+    HINGE,
+    JOINT,
+    SLIDE,
+    Clock,
+    build_machine,
+    set_servo_damping,
+)
+from rft.terradynamics.walking.spatial.mjcf import Mjcf
+from rft.terradynamics.walking.spatial.multibody import SUBSTEPS, Multibody
 
 ORDER = 1  # of the time steps
 PIECES = 4  # of an element of a leg or belly

@@ -17,16 +17,15 @@ from rft.terradynamics.walking.engines import (
     Walker,
     with_more_elements,
 )
-from rft.terradynamics.walking.limit import (
+from rft.terradynamics.walking.planar.equations import Robots, State
+from rft.terradynamics.walking.planar.limit import (
     Limit,
     LimitCycles,
     limit_cycles,
     predicted_progress,
 )
-from rft.terradynamics.walking.march import march
-from rft.terradynamics.walking.planar import Robots, State
-from rft.terradynamics.walking.robot import Rhex, Roller
-from rft.terradynamics.walking.stride import (
+from rft.terradynamics.walking.planar.march import march
+from rft.terradynamics.walking.planar.stride import (
     STUCK,
     Strides,
     Walk,
@@ -35,6 +34,7 @@ from rft.terradynamics.walking.stride import (
     cycles_to_settle,
     walk_from_rest,
 )
+from rft.terradynamics.walking.robot import Rhex, Roller
 
 ORDER = 2  # of the time steps
 

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from rft.terradynamics.walking.engines import Fineness, Walker
-from rft.terradynamics.walking.machine import build_machine
+from rft.terradynamics.walking.spatial.machine import build_machine
 
 # Colours are red, green, blue and opacity.
 SAND_COLOUR = (0.80, 0.65, 0.45, 0.75)

@@ -1,0 +1,1 @@
+"""Figures of accuracy and its cost."""

@@ -1,0 +1,1 @@
+"""Figures of beds of grains."""

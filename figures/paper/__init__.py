@@ -1,0 +1,1 @@
+"""Figures of Zhang and Goldman (2014)."""

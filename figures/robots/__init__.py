@@ -1,0 +1,1 @@
+"""Figures of robots on grains."""

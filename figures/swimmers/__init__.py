@@ -1,0 +1,1 @@
+"""Figures of swimmers: gaits, frames, trials and transients."""

@@ -1,0 +1,1 @@
+"""Figures of bodies that move through grains."""

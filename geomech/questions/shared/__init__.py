@@ -1,0 +1,1 @@
+"""What questions share: their base class, options and scenes."""

@@ -1,0 +1,1 @@
+"""Questions about swimmers: connections, displacements, forces and gaits."""

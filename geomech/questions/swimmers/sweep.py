@@ -1,0 +1,93 @@
+"""Displacement of a gait, or speed of a robot, over a grid of parameters of the
+scene."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+from geomech.core.variables import Result
+from geomech.questions.shared import loading, names, parsing
+from geomech.questions.shared.base import Option, Question, Run, Subject
+from geomech.run.cost import Cost
+from rft.core.refusal import Refusal
+
+if TYPE_CHECKING:
+    from geomech.scenes.model import Scene
+    from geomech.studies.displacement.sweep import Plan
+
+SHOWN = ("net_distance", "speed", "status")
+LARGEST_DRAWN = 2  # parameters of a figure
+
+
+@dataclass(frozen=True)
+class Sweep(Question):
+    """Compute displacement or speed over a grid of parameters. Speeds are those of
+    walking robots. A repeated command resumes an interrupted one."""
+
+    scene: Annotated["Scene", Subject(loading.load_moving, names.scene_names)]
+    over: Annotated[
+        Mapping[str, Sequence[float]],
+        Option(
+            "parameter and its values; may be repeated",
+            "KEY=VALUES",
+            parsing.parameters,
+            repeated=True,
+        ),
+    ]
+    # A file of finished batches, from which the same sweep resumes; a command has its
+    # own.
+    partial: Path | None = field(default=None, kw_only=True, compare=False)
+
+    name: ClassVar[str] = "sweep"
+    parallel: ClassVar[bool] = True
+
+    @cached_property
+    def plan(self) -> "Plan":
+        from geomech.studies.displacement.sweep import Plan
+
+        return Plan(self.scene, self.over)
+
+    def check(self) -> None:
+        _ = self.plan.grid  # refuses points that make no scene
+
+    def check_draw(self) -> None:
+        if len(self.over) > LARGEST_DRAWN:
+            raise Refusal(
+                f"cannot draw {len(self.over)} parameters",
+                instead="sweep one or two, or leave ``plot`` out",
+            )
+
+    def cost(self) -> Cost:
+        return self.plan.cost
+
+    def compute(self, run: Run) -> "Result":
+        from geomech.studies.displacement.sweep import store_batches
+
+        seconds = None
+        if "cost" in vars(self.plan):  # a command has asked for it
+            seconds = self.plan.cost.seconds
+        with store_batches(self.partial, self.scene):
+            return self.plan.result(run.progress, seconds)
+
+    @staticmethod
+    def headline(result: Result) -> list[str]:
+        axes = [v for v in result.variables if v.is_coordinate]
+        points = 1
+        for axis in axes:
+            points *= axis.values.size
+        over = " x ".join(f"{v.label} ({v.values.size})" for v in axes)
+        return [f"{result.attributes['scene']}: {points} points, {over}"]
+
+    @staticmethod
+    def summary(result: Result) -> Result:
+        return result.only(*SHOWN)
+
+    @staticmethod
+    def draw(result: Result) -> Any:
+        """Draw curves over one parameter, or maps over two; return the Figure."""
+        from geomech import plots
+        from geomech.results.scenes import scene_of
+
+        return plots.sweep_figure(scene_of(result), result)

@@ -1,0 +1,121 @@
+"""The motion of a body through its gait: pose, shape and ends of the links at every
+phase; as a film or a strip of pictures, too."""
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+from geomech.core.variables import POSE, Result
+from geomech.questions.shared import loading, names
+from geomech.questions.shared.base import Option, Question, Run, Subject
+from geomech.questions.shared.tools import FILMS, check_films, is_film
+from geomech.run.cost import Cost
+
+if TYPE_CHECKING:
+    from geomech.scenes.model import Scene
+
+FINAL = ("final_x", "final_y", "final_heading")
+CYCLES_OF_FILM = 3  # by default
+WITHOUT_MAP = (".csv", ".txt")  # files from which nothing is drawn
+
+
+def write_film(path: Path, result: Result) -> None:
+    """Write a film of the motion."""
+    from geomech.plots import films
+
+    films.write_motion(path, result)
+
+
+@dataclass(frozen=True)
+class Trajectory(Question):
+    """Follow the body through its gait. A table has pose, joint angles and ends of all
+    links at every phase. A film (-o FILE.gif) or a strip of pictures for a page
+    (--plot) shows the body on its track beside its shape on the CCF."""
+
+    scene: Annotated["Scene", Subject(loading.load_scene, names.scene_names)]
+    cycles: Annotated[
+        int | None,
+        Option("cycles of the gait, 3 in a film and else 1 if left out", "N"),
+    ] = None
+    # Whether the CCF is computed, on which pictures show the shape; whether a film is
+    # drawn, whose cost counts.
+    mapped: bool = field(default=True, kw_only=True)
+    filmed: bool = field(default=False, kw_only=True, compare=False)
+
+    name: ClassVar[str] = "trajectory"
+    table: ClassVar[tuple[str, ...]] = ("phase",)
+
+    @property
+    def title(self) -> str:
+        return f"motion of {self.scene.name}"
+
+    @property
+    def count(self) -> int:
+        """The number of cycles."""
+        if self.cycles is None:
+            return 1
+        return self.cycles
+
+    def for_files(self, paths: list[Path], options: dict[str, Any]) -> Question:
+        check_films(paths)
+        drawn = [path for path in paths if path.suffix.lower() not in WITHOUT_MAP]
+        filmed = any(map(is_film, paths))
+        cycles = self.cycles
+        if filmed and cycles is None:
+            cycles = CYCLES_OF_FILM
+        return replace(self, cycles=cycles, mapped=bool(drawn), filmed=filmed)
+
+    def for_picture(self, **options: Any) -> Question:
+        return replace(self, mapped=True)
+
+    def check(self) -> None:
+        from geomech.studies.mechanics import motion
+
+        motion.refuse_cycles(self.count)
+
+    def cost(self) -> Cost:
+        from geomech.studies.mechanics import motion
+
+        cost = motion.cost(self.scene, self.count, self.mapped)
+        if not self.filmed:
+            return cost
+        from geomech.plots import films
+
+        phases = self.scene.numerics.phases
+        frequency = motion.frequency_of(self.scene)
+        return motion.summed([cost, films.cost(phases, self.count, frequency)])
+
+    def compute(self, run: Run) -> Result:
+        from geomech.studies.mechanics import motion
+
+        tables = run.tables_of(self.scene)
+        return motion.answer(tables, self.count, self.mapped, run.shown_progress)
+
+    @staticmethod
+    def files() -> dict[str, Any]:
+        return dict.fromkeys(FILMS, write_film)
+
+    @staticmethod
+    def headline(result: Result) -> list[str]:
+        facts = result.attributes
+        count = facts["cycles"]
+        cycles = "1 cycle"
+        if count > 1:
+            cycles = f"{count} cycles"
+        return [
+            f"{facts['scene']}: motion of the frame {facts['frame']} over {cycles}",
+            "x ahead, y to the left, as the frame points at phase 0",
+        ]
+
+    @staticmethod
+    def summary(result: Result) -> Result:
+        return result.only(*FINAL, "time", *POSE)
+
+    @staticmethod
+    def draw(result: Result, *, pictures: int = 6) -> Any:
+        """Draw the body at some phases and its shapes beside it; return the Figure.
+
+        pictures: how many."""
+        from geomech import plots
+
+        return plots.filmstrip(result, pictures)

@@ -1,0 +1,1 @@
+"""Questions about intruders and walking robots."""

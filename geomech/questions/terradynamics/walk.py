@@ -1,0 +1,163 @@
+"""How a robot walks on grains: its motion from rest, and the means of its limit cycle
+with their errors."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+import numpy as np
+
+from geomech.core.variables import Result
+from geomech.questions.shared import loading, names
+from geomech.questions.shared.base import Option, Question, Run, Subject
+from geomech.questions.shared.tools import FILMS, check_films
+from geomech.results.show import scalar
+from geomech.run.cost import LONGEST, Cost
+
+if TYPE_CHECKING:
+    from geomech.scenes.terradynamics.walker import WalkerScene
+
+WALKING = "walking"  # status of a robot that neither sank nor fell
+ANGLES = {"pitch": "nose down", "roll": "left side up", "yaw": "turning left"}
+
+
+def write_film(
+    path: Path,
+    result: Result,
+    *,
+    follow: Annotated[bool, Option("the camera of the film goes with the robot")] = (
+        False
+    ),
+) -> None:
+    """Write a film of the walk."""
+    from geomech.plots import films
+
+    films.write_walk(path, result, follow)
+
+
+@dataclass(frozen=True)
+class Walk(Question):
+    """Compute how a robot walks on grains. The mean speed has an error; the motion
+    begins at rest. SI units, pitch in rad, nose down."""
+
+    scene: Annotated["WalkerScene", Subject(loading.load_walker, names.walker_names)]
+    engine: Annotated[
+        str | None, Option("planar or mujoco, in place of the scene's", "ENGINE")
+    ] = None
+
+    name: ClassVar[str] = "walk"
+    table: ClassVar[tuple[str, ...]] = ("t",)
+
+    def check(self) -> None:
+        from geomech.studies.terradynamics import walking
+
+        walking.refuse_engine(self.scene, self.engine)
+
+    def for_files(self, paths: list[Path], options: dict[str, Any]) -> Question:
+        check_films(paths)
+        return self
+
+    def cost(self) -> Cost:
+        from geomech.studies.terradynamics import walking
+
+        return walking.walk_cost(self.scene, engine_name=self.engine)
+
+    def compute(self, run: Run) -> Result:
+        from geomech.studies.terradynamics import walking
+
+        longest = math.inf
+        if run.limited:
+            longest = LONGEST
+        found = walking.run(self.scene, self.engine, run.progress, longest)
+        return Result("walk", tuple(walking.variables(self.scene, found)))
+
+    @staticmethod
+    def files() -> dict[str, Any]:
+        return dict.fromkeys(FILMS, write_film)
+
+    @staticmethod
+    def headline(result: Result) -> list[str]:
+        name = result.attributes["scene"]
+        status = str(result["status"].values)
+        speed = scalar(result["speed"])
+        cycle = "no limit cycle found: mean of what there is"
+        if result["periodic"].values:
+            cycle = f"limit cycle{settling_words(result)}"
+        frequency = float(result["frequency"])
+        return [f"{name}: {status} at {speed} at {frequency:g} Hz ({cycle})"]
+
+    @staticmethod
+    def summary(result: Result) -> Result:
+        shown = ["total_work", "total_loss", "cost_of_transport"]
+        if str(result["status"].values) != WALKING:
+            shown.remove("cost_of_transport")
+        if "yaw" in result:
+            shown = ["lateral_speed", "yaw_rate", *shown]
+        return result.only(*shown)
+
+    @staticmethod
+    def remarks(result: Result) -> list[str]:
+        steps = float(result["speed_error_of_steps"])
+        elements = float(result["speed_error_of_elements"])
+        share = 100 * float(result["unaccounted"])
+        lines = [
+            motion_words(result),
+            f"of the error {steps:.1g} m/s are of the steps, {elements:.1g} m/s of the"
+            " elements",
+            f"not accounted for, by the steps: {share:.2g} % of the work",
+        ]
+        unsolved = int(result["unsolved"].values)
+        if unsolved:
+            residual = float(result["residual"])
+            speed_error = float(result["speed_error_of_unsolved"])
+            lines.append(
+                f"{unsolved} steps were taken unsolved, off by up to {residual:.1g} "
+                f"m/s, which moves the speed by {speed_error:.1g} m/s: "
+                "raise [numerics] steps or rounding"
+            )
+        return lines
+
+    @staticmethod
+    def draw(
+        result: Result,
+        *,
+        strip: Annotated[bool, Option("draw the last cycle in pictures")] = False,
+    ) -> Any:
+        """Draw speed, height and pitch in time, and the robot at its end, or the last
+        cycle in pictures; return the Figure."""
+        from geomech import plots
+
+        if strip:
+            return plots.walk_strip(result)
+        return plots.walk_figure(result)
+
+
+def settling_words(result: Result) -> str:
+    """Return the time that a robot takes from rest to the limit cycle, in words."""
+    from geomech.studies.terradynamics.walking import NEAR
+
+    if "settling_time" not in result:
+        return ""
+    time = float(result["settling_time"])
+    within = f"within {100 * NEAR:g} % of it"
+    if math.isinf(time):
+        return f"; from rest it does not come {within}"
+    if time == 0:
+        return f"; {within} from the start"
+    return f"; from rest {within} after {time:.2g} s"
+
+
+def motion_words(result: Result) -> str:
+    """Return where the robot went and how far it turned."""
+    t, x, z = (result[name].values for name in ("t", "x", "z"))
+    words = f"t = 0 to {t[-1]:.4g} s: x to {x[-1]:.4g} m"
+    if "y" in result:
+        words = f"{words}, y to {result['y'].values[-1]:.2g} m"
+    words = f"{words}, z {z.min():.4g} to {z.max():.4g} m"
+    for name, positive in ANGLES.items():
+        if name in result:
+            degrees = np.degrees(result[name].values)
+            span = f"{degrees.min():.3g} to {degrees.max():.3g} degrees"
+            words = f"{words}, {name} {span} ({positive} +)"
+    return words

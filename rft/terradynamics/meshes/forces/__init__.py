@@ -1,0 +1,1 @@
+"""Forces of grains on triangles by three-dimensional resistive force theory."""

@@ -1,0 +1,1 @@
+"""Surfaces of bodies as triangles: their shapes, files and geometry."""

@@ -1,0 +1,1 @@
+"""Robots that walk in the vertical plane: their equations, time steps and limit cycles."""

@@ -1,0 +1,1 @@
+"""Robots that walk in three dimensions, as MuJoCo models."""

@@ -1,0 +1,356 @@
+"""Stated limits of parameters, taken at the limit, refused next to it; and stated defaults."""
+
+import dataclasses
+import functools
+import math
+
+import frozen
+import numpy as np
+import pytest
+from loads import element_load
+from registry import GAITS
+
+from geomech.mathematics.gaits import Butterfly, Circle, Ellipse, Points, Sine
+from geomech.mathematics.geometry import connection, family
+from geomech.mathematics.geometry.representations import harmonics
+from geomech.mathematics.geometry.representations.field import Field
+from geomech.mathematics.systems import Swimmer
+from geomech.mathematics.tiers import fitted
+from geomech.mathematics.tiers.base import Numerics
+from geomech.mathematics.tiers.direct import direct
+from geomech.mathematics.tiers.path import path
+from geomech.questions.measured.fit_gait import FitGait
+from geomech.studies.optimisation.local.objectives import Objective
+from rft import (
+    Backbone,
+    BodyInertia,
+    Chain,
+    ConstantCurvature,
+    DepthProfile,
+    DisturbedGround,
+    EndCaps,
+    GrainInertia,
+    Granular,
+    Serpenoid,
+    SkinFriction,
+    TowedSled,
+    Transient,
+    Viscous,
+    body_velocity,
+)
+from rft.laws.drag import Rod
+from rft.mujoco.media import sample
+from rft.terradynamics.meshes import Spatial
+from rft.terradynamics.meshes.surfaces.shapes import leg
+from rft.terradynamics.plates import CLeg
+from rft.terradynamics.walking import Rhex
+from rft.terradynamics.walking.spatial.facets import Grains
+
+TRIAL = frozen.FOLDER / "trial.csv"
+pytestmark = pytest.mark.filterwarnings("ignore::geomech.core.errors.UnitWarning")
+
+
+def still(alpha, alphadot):
+    return np.zeros((*np.broadcast_shapes(alpha.shape, alphadot.shape)[:-1], 3))
+
+
+def having(kind, name, **others):
+    return lambda x: kind(**others | {name: x})
+
+
+def solved(name):
+    return lambda x: body_velocity(
+        Viscous(), Chain(), [0.1, 0.2], [1.0, 0.0], **{name: x}
+    )
+
+
+FAMILY = family.fit(still, Circle(), 2.0, 4, 8)
+GRAINS = {"frequency": 1.0, "length": 1.0, "depth": 1.0}
+MASS = {"mass": 1e-9, "frequency": 1e-3, "length": 1e-3, "drag": 1e3}
+ROBOT = functools.partial(Rhex, 0.15, 0.13, 0.03, 0.05, CLeg(0.02, 0.01))
+LEAST, NEXT_TO_RIGHT = math.ulp(0.0), math.nextafter(math.pi / 2, 0)
+NUMBERS = [
+    # what, made of the number, the least and the largest that is taken; None: tested elsewhere
+    ("chain length", having(Chain, "length"), 1e-15, 1e15),
+    ("waves", having(Serpenoid, "waves", elements=24), LEAST, 6.0),
+    ("C", having(Granular, "C", gamma0=0.2), 0.0, 1e6),
+    ("gamma0", having(Granular, "gamma0", C=1.0), LEAST, NEXT_TO_RIGHT),
+    (
+        "ratio",
+        lambda x: body_velocity(Viscous(x), Chain(), [1.0, 0.2], [1.0, 0.3]),
+        1e-8,
+        1e8,
+    ),
+    *(
+        (name, having(SkinFriction, name), 1e-3, 100.0)
+        for name in ("forward", "backward", "reference")
+    ),
+    ("cap radius", having(EndCaps, "radius"), 0.0, 1.0),
+    *(
+        (name, having(EndCaps, name, radius=0.1), 0.0, 100.0)
+        for name in ("head", "tail")
+    ),
+    ("frequency", having(GrainInertia, "frequency", **GRAINS), 0.0, 1e4),
+    *(
+        (name, having(GrainInertia, name, **GRAINS), 1e-9, 1e6)
+        for name in ("length", "depth")
+    ),
+    ("strength", having(GrainInertia, "strength", **GRAINS), 0.0, 1e6),
+    ("mass", having(BodyInertia, "mass", **MASS), 0.0, 1e9),
+    ("mass's frequency", having(BodyInertia, "frequency", **MASS), 0.0, 1e4),
+    ("mass's length", having(BodyInertia, "length", **MASS), 1e-9, 1e6),
+    ("mass's drag", having(BodyInertia, "drag", **MASS), 1e-12, 1e12),
+    ("slope", having(DepthProfile, "slope"), 0.0, 1000.0),
+    ("depth", lambda x: DepthProfile(along=(1.0, x)), LEAST, 1000.0),
+    ("towards", having(DepthProfile, "towards", slope=1.0), -1e6, 1e6),
+    ("ground's radius", having(DisturbedGround, "radius", weakening=0.5), 0.01, 0.25),
+    ("weakening", having(DisturbedGround, "weakening", radius=0.1), 0.0, 1.0),
+    ("travel", having(Transient, "travel"), 0.0, 10.0),
+    ("pull", having(TowedSled, "pull"), 0.0, 1000.0),
+    ("distance", having(TowedSled, "distance", pull=0.1), 0.0, 10.0),
+    ("regularisation", solved("regularisation"), 1e-15, 1e3),
+    ("tolerance", solved("tolerance"), 1e-15, 1e3),
+    ("gait's amplitude", having(Circle, "amplitude"), -1e6, 1e6),
+    ("amplitudes", lambda x: Circle().shape(0.0, [x]), -1e6, 1e6),
+    ("semi-axis", lambda x: Ellipse(semi_axes=(1.0, x)), -1e6, 1e6),
+    ("sine's amplitude", having(Sine, "amplitude"), -10.0, 10.0),
+    ("sine's amplitudes", lambda x: Sine(elements=4).shape(0.0, [x]), -10.0, 10.0),
+    ("sine's waves", having(Sine, "waves", elements=12), LEAST, 3.0),
+    ("extent", lambda x: connection.grid(2, 4, x), 1e-9, 1e6),
+    (
+        "family's amplitude",
+        lambda x: family.fit(still, Circle(), x, 4, 8),
+        1e-300,
+        None,
+    ),
+    ("off the family", FAMILY.area, 0.0, None),
+    ("hip", lambda x: ROBOT(hips=(0.0, x)), -0.13, 0.13),
+    ("leg's distance", lambda x: ROBOT(hips=(0.0, 0.1), aside=(0.03, x)), 0.0, 10.0),
+    ("grains' density", lambda x: Spatial.from_grains(x, 0.5), 1.0, 1e5),
+    ("grains' friction", lambda x: Spatial.from_grains(1500.0, x), 0.05, 1.5),
+    ("spread of media", lambda x: sample(Spatial(3e5), 1, spread=x), 0.0, 2.0),
+    *(
+        (f"rod's {name}", having(Rod, name), 1e-9, 1e3)
+        for name in ("radius", "length", "depth")
+    ),
+    ("rod's density", having(Rod, "density"), 1e-9, 1e6),
+    ("curvature of a leg", lambda x: leg(0.1, x, 1e-3, 0.02, 2, 2, 1), -1.0, 1.0),
+    ("width of a leg", lambda x: leg(0.1, 0.5, 1e-3, x, 2, 2, 1), 1e-6, 1e3),
+    *(
+        (
+            f"objective's {name}",
+            having(functools.partial(Objective, "speed"), name),
+            1e-9,
+            1e9,
+        )
+        for name in ("rate", "power")
+    ),
+    (
+        "body length of midlines",
+        lambda x: FitGait(TRIAL, body_length=x).check(),
+        1e-9,
+        1e9,
+    ),
+    *(
+        (f"grains' {name}", having(Grains, name, law=Spatial(3e5)), 0.0, 1e9)
+        for name in ("strength", "flux")
+    ),
+    ("grains' rounding", having(Grains, "rounding", law=Spatial(3e5)), 1e-7, 10.0),
+]
+COUNTS = [
+    # what, made of the number, its least and its largest; None: no limit of its own
+    ("links", lambda n: Chain((1.0,) * n), 2, None),
+    ("frame", lambda n: Chain(frame=f"link-{n}"), 1, 3),
+    ("elements", lambda n: Backbone(elements=n), 3, 2000),
+    ("sine's elements", lambda n: Sine(elements=n, waves=0.5), 3, 2000),
+    ("sections", lambda n: ConstantCurvature(elements=12, sections=n), 1, None),
+    ("depths", lambda n: DepthProfile(along=(1.0,) * n), 2, None),
+    (
+        "pieces",
+        lambda n: body_velocity(Viscous(), Chain(), [0.1, 0.2], [1.0, 0.0], pieces=n),
+        1,
+        10_000,
+    ),
+    ("midpoints", lambda n: element_load(Viscous(), f"midpoint:{n}"), 1, 1000),
+    ("grid", lambda n: connection.grid(2, n), 4, None),
+    ("directions, one joint", lambda n: connection.directions(1, n), 1, None),
+    ("directions, two joints", lambda n: connection.directions(2, n), 2, None),
+    ("directions, three joints", lambda n: connection.directions(3, n), 12, None),
+    (
+        "points of a spline",
+        lambda n: connection.fit(still, (np.arange(float(n)),), degree=5),
+        6,
+        None,
+    ),
+    (
+        "directions of harmonics",
+        lambda n: harmonics.fit(still, connection.grid(2, 4), n, highest=5),
+        6,
+        None,
+    ),
+    ("curves", lambda n: family.fit(still, Circle(), 1.0, n, 8), 4, None),
+    ("phases", lambda n: Circle().cycle(n), 4, None),
+    ("phases of the butterfly", lambda n: Butterfly().cycle(n), 11, None),
+    ("hips", lambda n: ROBOT(hips=(0.05,) * n), 1, 20),
+    (
+        "degree of a fit",
+        lambda n: connection.fit(still, (np.arange(9.0),), degree=n),
+        1,
+        5,
+    ),
+    ("degree of a field", lambda n: Field((np.arange(9.0),), np.zeros(9), n), 0, 5),
+    (
+        "axis of a field",
+        Field((np.arange(4.0),) * 2, np.zeros((4, 4))).derivative,
+        0,
+        1,
+    ),
+    ("media", lambda n: sample(Spatial(3e5), n, spread=0.1), 1, None),
+    ("quadrilaterals of a leg", lambda n: leg(0.1, 0.5, 1e-3, 0.02, n, 1, 1), 2, 4096),
+    (
+        "points of a gait",
+        lambda n: Points(points=tuple((k, k * k) for k in range(n))),
+        3,
+        None,
+    ),
+]
+
+
+@pytest.mark.parametrize(
+    ("make", "least", "most"), [pytest.param(*row[1:], id=row[0]) for row in NUMBERS]
+)
+def test_numbers(make, least, most):
+    for last, towards in ((least, -math.inf), (most, math.inf)):
+        if last is not None:
+            make(last)
+            with pytest.raises(ValueError):  # noqa: PT011 (what it says is tested elsewhere)
+                make(math.nextafter(last, towards))
+
+
+@pytest.mark.parametrize(
+    ("make", "least", "most"), [pytest.param(*row[1:], id=row[0]) for row in COUNTS]
+)
+def test_counts(make, least, most):
+    for last, beyond in ((least, least - 1), (most, (most or 0) + 1)):
+        if last is not None:
+            make(last)
+            with pytest.raises(ValueError):  # noqa: PT011
+                make(beyond)
+
+
+def test_degrees_are_whole():
+    with pytest.raises(ValueError, match="degree"):
+        connection.fit(still, (np.arange(9.0),), degree=2.5)
+
+
+@pytest.mark.parametrize(
+    ("make", "taken", "refused"),
+    [
+        (lambda x: Chain((x / 4, x / 4)), 1.999e100, 2.001e100),
+        (lambda x: Chain((1.0, x)), 1.000001e-12, 0.999999e-12),
+        (FAMILY.area, 2.0 * (1 + 1e-13), 2.0 * (1 + 1e-11)),
+        (
+            lambda x: Points(points=((0, 0), (x, 0), (0.5, 0), (0.5, 0.5))),
+            1.8e-12,
+            1.6e-12,
+        ),
+        (
+            lambda x: BodyInertia(
+                mass=x, frequency=1.0, length=1.0, drag=(2 * math.pi) ** 2
+            ),
+            0.999999e6,
+            1.000001e6,
+        ),
+    ],
+    ids=[
+        "sum of lengths",
+        "shortest link",
+        "amplitude of a family",
+        "distance of points",
+        "inertia",
+    ],
+)
+def test_limits_of_what_follows_from_numbers(make, taken, refused):
+    make(taken)
+    with pytest.raises(ValueError):  # noqa: PT011
+        make(refused)
+
+
+@pytest.mark.parametrize("gait", [*GAITS.values(), Sine()], ids=[*GAITS, "sine"])
+def test_every_gait_has_one_centre_and_one_amplitude(gait):
+    for bad in (
+        {"amplitude": math.nan},
+        {"centre": (1.0,)},
+        {"centre": (math.inf, 0.0)},
+    ):
+        with pytest.raises(ValueError, match="amplitude|centre"):
+            dataclasses.replace(gait, **bad)
+
+
+@pytest.mark.parametrize("highest", [-1, 0, 2, 4])
+def test_harmonics_are_odd(highest):
+    with pytest.raises(ValueError, match="harmonics must be odd"):
+        harmonics.fit(still, connection.grid(2, 4), 12, highest=highest)
+
+
+def test_a_frame_of_another_body_is_refused():
+    for kind in (ConstantCurvature, lambda elements: Serpenoid(elements, waves=0.1)):
+        with pytest.raises(ValueError, match="elements must"):
+            kind(elements=2)
+    for sections in (5, 24):
+        with pytest.raises(ValueError, match="sections must"):
+            ConstantCurvature(elements=12, sections=sections)
+    with pytest.raises(ValueError, match="'link-9', got 'link-10'"):
+        Backbone(elements=9).frame_pose("link-10", np.zeros(8), np.zeros(8))
+
+
+def test_what_is_left_out_is_what_the_documentation_says():
+    """Defaults, told apart by what they do, not by what they are called."""
+    np.testing.assert_allclose(
+        Ellipse().shape([0, math.pi / 2]), [[1, 0], [0, 0.5]], atol=1e-15
+    )
+    np.testing.assert_allclose(Circle().shape([0, math.pi / 2]), np.eye(2), atol=1e-15)
+    assert Sine() == Sine(amplitude=0.2, waves=1.0, elements=100, reverse=False)
+    assert Chain() == Chain((1.0, 1.0, 1.0), None, "mean")
+    assert Serpenoid() == Serpenoid(100, None, "mean", 1.0)
+    assert ConstantCurvature() == ConstantCurvature(100, None, "mean", 2)
+    assert Viscous() == Viscous(2.0)
+    assert SkinFriction() == SkinFriction(0.109, 0.137, 0.15)
+    assert EndCaps(0.1) == EndCaps(0.1, head=1.0, tail=1.0)
+    assert GrainInertia(**GRAINS) == GrainInertia(**GRAINS, strength=1.0)
+    assert DepthProfile() == DepthProfile((1.0, 1.0), 0.0, 0.0)
+    for medium, counts in ((Viscous(), [8, 12, 16]), (Granular(1.8, 0.2), [8, 48, 64])):
+        systems = [Swimmer(medium, Chain((1.0,) * links)) for links in (3, 4, 5)]
+        assert [fitted.directions(system, Numerics()) for system in systems] == counts
+    axes = connection.grid(2)
+    assert (
+        len(axes) == 2
+        and [(len(a), a[0], a[-1]) for a in axes] == [(31, -2.5, 2.5)] * 2
+    )
+
+
+@pytest.mark.parametrize(
+    ("ask", "shapes", "each"),
+    [
+        (lambda v: connection.fit(v, connection.grid(2, 5), trusted=True), 25, 8),
+        (lambda v: harmonics.fit(v, connection.grid(2, 5)), 25, 24),
+        (lambda v: family.fit(v, Circle(), 1.0), 24, 128),
+        (lambda v: direct(v, Circle(), [0.5, 1.0]), 2, 256),
+        (lambda v: path(v, Circle()), 1, 256),
+    ],
+    ids=["connection", "harmonics", "family", "direct", "path"],
+)
+def test_velocities_asked_for_by_default(ask, shapes, each):
+    """How many shapes or curves, and how many directions or phases at each."""
+    asked = []
+
+    def counted(alpha, alphadot):
+        asked.append(np.broadcast_shapes(alpha.shape, alphadot.shape)[:-1])
+        return still(alpha, alphadot)
+
+    found = ask(counted)
+    assert sum(math.prod(shape[:-1]) for shape in asked) == shapes
+    assert {shape[-1] for shape in asked} == {each}
+    if isinstance(found, harmonics.Harmonics):
+        assert found.highest == 9
+    assert getattr(found, "degree", 3) == 3

@@ -1,0 +1,234 @@
+"""The pages: README, CONTRIBUTING and those of the site: links, pictures, commands and code, as they stand there. The site's
+build (`.ci/docs`) runs the examples of the gallery and the notebooks, and finds pages that no other leads to."""
+
+import itertools
+import math
+import pathlib
+import re
+import shlex
+
+import pytest
+from commands import geomech
+from frozen import read_commands
+
+from geomech.questions.shared import names
+from geomech.scenes.data import drag
+from geomech.shell import cli
+from rft.balance import backend
+from rft.laws import CATALOGUE
+from rft.terradynamics.plates import VERTICAL
+
+pytestmark = pytest.mark.usefixtures("fastest")
+ROOT = pathlib.Path(__file__).parents[2]
+README, CONTRIBUTING = ROOT / "README.md", ROOT / "CONTRIBUTING.md"
+SITE = ROOT / ".docs"
+PAGES = [
+    README,
+    CONTRIBUTING,
+    *sorted(p for p in SITE.rglob("*.md") if p.parent != SITE / "generated"),
+]
+SHIPPED = {
+    *names.scene_names(),
+    *names.intruder_names(),
+    *names.walker_names(),
+    *CATALOGUE,
+    *VERTICAL,
+    *drag.SAMPLES,
+}
+COMMANDS = cli.Commands()
+NUMBER = r"-?\d+(?:\.\d+)?(?:e[+-]\d+)?"
+
+
+def text(page):
+    return page.read_text(encoding="utf-8")
+
+
+def blocks(page, language=""):
+    """Blocks of code on a page whose first line is ```language."""
+    return [
+        code
+        for first, code in re.findall(r"(?ms)^```([^\n]*)\n(.*?)^```$", text(page))
+        if first == language
+    ]
+
+
+def prose(page):
+    """Lines of a page outside of its blocks of code, without code within them."""
+    outside = re.sub(r"(?ms)^```.*?^```$", "", text(page))
+    return re.sub(
+        r"`[^`]*`",
+        lambda code: code[0].strip("`") if "](" not in code[0] else "",
+        outside,
+    )
+
+
+def anchors(page):
+    """GitHub's anchors of the headings of a page; two headings of one name would have the same here."""
+    titles = re.findall(r"^#+ (.+)$", prose(page), re.M)
+    found = [
+        re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles
+    ]
+    assert len(set(found)) == len(found), page
+    return set(found)
+
+
+def links(page):
+    """Targets of the links and pictures of a page within the repository, as (file, anchor)."""
+    for target in re.findall(r"\]\(([^)]+)\)", prose(page)):
+        if not re.match(r"[a-z]+:|/generated/", target):  # which the build makes
+            path, _, anchor = target.partition("#")
+            yield (page.parent / path).resolve() if path else page, anchor
+
+
+def commands(page):
+    """Command lines of geomech on a page, as words: of blocks, of tables and in sentences; templates with their brackets."""
+    code = [
+        line
+        for language in ("", "sh", "console")
+        for block in blocks(page, language)
+        for line in block.splitlines()
+    ]
+    inline = re.findall(r"`([^`]+)`", re.sub(r"(?ms)^```.*?^```$", "", text(page)))
+    for line in code + [" ".join(x.split()).replace("\\|", "|") for x in inline]:
+        line = line.removeprefix("$ ")
+        if re.match(r"(\.venv/bin/)?geomech [a-z][a-z-]*( |$)", line):
+            for one in re.split(r" && ", line):
+                yield shlex.split(one.partition(" > ")[0], comments=True)[1:]
+
+
+def test_links_and_pictures_of_all_pages_lead_somewhere():
+    assert len(PAGES) > 18
+    headings = {page: anchors(page) for page in PAGES}
+    found = [(page, *link) for page in PAGES for link in links(page)]
+    assert len(found) > 110
+    broken = [(page.relative_to(ROOT), path, anchor) for page, path, anchor in found
+              if not path.is_file() or (anchor and anchor not in headings.get(path, ()))]  # fmt: skip
+    assert broken == []
+
+
+def test_the_readme_leads_to_the_site_and_to_what_maintainers_read():
+    assert {SITE / "index.md", CONTRIBUTING} <= {path for path, _ in links(README)}
+
+
+def test_every_picture_is_shown_on_a_page_and_pages_are_no_wider_than_code():
+    shown = {path for page in PAGES for path, _ in links(page)}
+    assert set((ROOT / "figures").rglob("*.png")) <= shown
+    wide = [(page.relative_to(ROOT), line) for page in PAGES for line in
+            re.sub(r"(?ms)^```.*?^```$", "", text(page)).splitlines()
+            if len(line) > 120 and not line.startswith(("|", "!["))]  # fmt: skip
+    assert wide == []
+
+
+def test_no_paragraph_and_no_row_stands_on_two_pages():
+    seen = {}
+    for page in PAGES:
+        for part in re.split(r"\n\n+|\n(?=\|)", text(page)):
+            if len(part) > 100 and not part.startswith("!["):
+                seen.setdefault(" ".join(part.split()), []).append(
+                    page.relative_to(ROOT)
+                )
+    assert [pages for pages in seen.values() if len(pages) > 1] == []
+
+
+def test_the_readme_is_short_and_begins_with_what_installs_and_what_tests():
+    assert len(text(README).splitlines()) <= 140
+    install, suite, tries = blocks(README, "sh")
+    assert "pip install -q . &&" in install and "geomech run -o results" in install
+    assert "pip install -q -e '.[test]' &&" in suite and suite.endswith(
+        "-m pytest -q\n"
+    )
+    assert len(install.splitlines()) == len(suite.splitlines()) == 1
+    assert [line.split()[1] for line in tries.splitlines()] == [
+        "displacement",
+        "ccf",
+        "trajectory",
+        "scenes",
+    ]
+
+
+def test_commands_on_all_pages_exist_with_their_options_and_names():
+    found = [
+        (page.relative_to(ROOT), line) for page in PAGES for line in commands(page)
+    ]
+    assert len(found) > 80
+    # `loop` is the example of a new command.
+    found = [(page, line) for page, line in found if line[0] != "loop"]
+    assert {line[0] for _, line in found} == set(COMMANDS)
+    for page, (name, *words) in found:
+        options = {
+            option
+            for x in COMMANDS[name].params
+            for option in x.opts + x.secondary_opts
+        } | {"--plugin"}
+        for word in words:
+            for option in re.findall(r"(?:^|(?<=[\[|]))--?[a-z][\w-]*", word):
+                assert option in options, (page, name, word)
+        if (
+            name not in ("scenes", "reference")
+            and words
+            and re.fullmatch(r"[a-z][\w-]+", words[0])
+        ):
+            assert words[0] in SHIPPED, (page, name, words)
+
+
+# They draw for seconds each: test_cli.py runs them; their options and names are looked up above.
+DRAWN = {"run", "ccf", "trajectory"}
+TYPED = {" ".join(line): line for line in commands(README) if len(line) > 1 and line[0] not in DRAWN
+         and not any(re.search(r"\b[A-Z]{3,}\b", word) for word in line)}  # fmt: skip
+
+
+def test_most_of_what_the_readme_says_to_type_is_run():
+    some = {
+        "displacement",
+        "fit-medium",
+        "connection",
+        "optimize",
+        "symbolic",
+        "intrude",
+        "walk",
+        "explain",
+        "sweep",
+    }
+    assert len(TYPED) > 10 and some <= {line[0] for line in TYPED.values()}
+
+
+@pytest.mark.parametrize(
+    "line",
+    [line for text, line in TYPED.items() if text not in read_commands()],
+    ids=" ".join,
+)
+def test_what_the_readme_says_to_type_runs(line, tmp_path, monkeypatch):
+    """What is no line of data/commands.txt."""
+    monkeypatch.chdir(tmp_path)
+    code, out, err = geomech(*line)
+    assert code == 0, err
+    files = {
+        word for option, word in itertools.pairwise(line) if option in ("-o", "--plot")
+    }
+    assert (out or files) and files == {p.name for p in tmp_path.iterdir()}
+
+
+BUILT = SITE / "gallery", SITE / "notebooks"  # whose code the site's build runs
+WITH_PYTHON = {page.relative_to(ROOT).as_posix(): page for page in PAGES
+               if page.parent not in BUILT and blocks(page, "python")}  # fmt: skip
+
+
+@pytest.mark.parametrize("page", WITH_PYTHON.values(), ids=WITH_PYTHON)
+def test_python_on_all_pages_runs(page, tmp_path, capsys, monkeypatch, own_parts):
+    monkeypatch.chdir(tmp_path)
+    for code in blocks(page, "python"):
+        own_law = (
+            "@formula" in code
+        )  # of no module, from which code compiled by an earlier run could be loaded
+        with backend.preferring("numpy" if own_law else backend.preferred()):
+            exec(code, {"__name__": "page"})
+    if page == README:
+        (said,) = blocks(page)
+        out = capsys.readouterr().out
+        assert re.sub(NUMBER, "#", out) == re.sub(NUMBER, "#", said)
+        for ours, theirs in zip(re.findall(NUMBER, out), re.findall(NUMBER, said)):
+            assert math.isclose(float(ours), float(theirs), rel_tol=1e-4), (
+                ours,
+                theirs,
+            )
+        assert (tmp_path / "swimmer.png").is_file()

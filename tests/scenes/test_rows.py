@@ -1,0 +1,410 @@
+"""Tables of other people: one table in the forms that spreadsheets, loggers, robots and trackers write it gives the
+same numbers, what is decided is told, and what cannot be decided is refused."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.commands import geomech
+
+from geomech import scenes
+from geomech.core.errors import Note
+from geomech.io import rows, tables
+from geomech.mathematics.gaits import Shchf
+from geomech.scenes.data import drag
+from geomech.scenes.terradynamics import penetration
+from geomech.studies.measured import log as logs
+from geomech.studies.measured.midlines import reader
+from rft.core.refusal import Refusal
+
+DEPTH = np.array([0.0, 0.5, 1.25, 2.0, 3.5])  # mm
+FORCE = np.array([0.0, 3.5, 7.25, 11.0, 17.5])  # N
+PLAIN = "depth_mm,force_N\n" + "".join(
+    f"{d:.2f},{f:.2f}\n" for d, f in zip(DEPTH, FORCE)
+)
+GERMAN = PLAIN.replace(",", ";").replace(".", ",")
+HEAD = "1/2/2024,10:00:00\nLatitude : 0.0 | Longitude : 0.0\nPlate Diameter: 4.00cm\n"
+FORMS = {
+    "plain": (PLAIN, ""),
+    "no line end": (PLAIN.rstrip("\n"), ""),
+    "empty lines": (PLAIN + "\n,\n  \n", ""),
+    "semicolons": (PLAIN.replace(",", ";"), "semicolons"),
+    "tabs": (PLAIN.replace(",", "\t"), "tabs"),
+    "blanks": (PLAIN.replace(",", "   "), "blanks"),
+    "decimal commas": (GERMAN, "decimal commas"),
+    "commas and tabs": (GERMAN.replace(";", "\t"), "decimal commas"),
+    "commas and blanks": (GERMAN.replace(";", " "), "decimal commas"),
+    "quotes": (
+        "depth_mm,force_N\n"
+        + "".join(f'"{line}"\n'.replace(";", '","') for line in GERMAN.split()[1:]),
+        "decimal commas",
+    ),
+    "mark": ("\ufeff" + PLAIN, ""),
+    "UTF-16": (PLAIN.encode("utf-16"), "UTF-16"),
+    "UTF-16, no mark": (PLAIN.encode("utf-16-le"), "UTF-16"),
+    "line of units": (PLAIN.replace("_N\n", "_N\nmm,N\n"), "line 2 is one of units"),
+    "units below": (PLAIN.replace("depth_mm,force_N", "Depth,Force\n[mm],[N]"), "units"),
+    "logger": (HEAD + PLAIN + "End (:", "above line 4.*line 10 at its end"),
+    "cut off": (PLAIN + "3.75", "line 7 at its end is no whole row"),
+    "other names": (PLAIN.replace("depth_mm,force_N", "Sinkage (mm),Force / N"), "Sinkage"),
+    "ends": (PLAIN.replace("\n", ",\n"), ""),
+    "comment": ("# " + PLAIN, "comment in line 1 is its header"),
+    "letters": (PLAIN.replace("\n", ",µ\n").replace("_N,µ", "_N,größe").encode("cp1252"), "1252"),
+    "micrometres": (
+        "depth (µm),force_N\n"
+        + "".join(f"{1e3 * d:.2f},{f}\n" for d, f in zip(DEPTH, FORCE)),
+        "",
+    ),
+    "MN": (
+        "depth_mm,force (MN)\n"
+        + "".join(f"{d},{1e-6 * f:.9f}\n" for d, f in zip(DEPTH, FORCE)),
+        "",
+    ),
+}  # fmt: skip
+
+
+def written(path: Path, text: str | bytes) -> Path:
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_table_in_any_form_has_the_same_numbers_and_one_note(form, tmp_path):
+    text, told = FORMS[form]
+    source = rows.read(written(tmp_path / "push.csv", text), 10_000, "")
+    with warnings.catch_warnings(record=True) as notes:
+        warnings.simplefilter("always")
+        test = penetration.read(source)
+    np.testing.assert_allclose(test.depth, 1e-3 * DEPTH, rtol=1e-12)
+    np.testing.assert_allclose(test.force, FORCE, rtol=1e-12)
+    assert [str(note.category) for note in notes] == [str(Note)] * bool(told)
+    if told:
+        with pytest.warns(Note, match=f"(?s)^push.csv: .*{told}"):
+            penetration.read(source)
+    if form == "logger":
+        assert test.area[0] == pytest.approx(np.pi * 0.02**2)
+
+
+@pytest.mark.parametrize(
+    ("size", "head", "radius"),
+    [
+        ("8,5 mm", "psi_deg;F_parallel_N;F_perpendicular_N\n0;1,5;2\n90;2;3\n", 0.0085),
+        ("8,5 mm", "psi_deg,F_parallel_N,F_perpendicular_N\n0,1,2\n90,2,3\n", None),
+        ("8, long 80 mm", "psi_deg,F_parallel_N,F_perpendicular_N\n0,1,2\n90,2,3\n", 8),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::geomech.core.errors.Note")
+def test_sizes_with_a_comma_are_no_metres(size, head, radius, tmp_path):
+    path = written(tmp_path / "rod.csv", f"# radius = {size}\n{head}")
+    if radius is None:
+        with pytest.raises(Refusal, match="8,5 in the header lines"):
+            drag.read(path)
+    else:
+        assert drag.read(path).sizes["radius"] == pytest.approx(radius)
+
+
+@pytest.mark.parametrize(
+    ("head", "said"),
+    [
+        ("time,joint_1,joint_2,x,y,yaw,theta", "yaw and theta|theta and yaw"),
+        ("time,joint_1_deg,joint_2,x,y,yaw,more", "joint_2 has no unit beside joints"),
+        ("time,t,joint_1,joint_2,x,y,yaw", "time and t may both be the column t"),
+    ],
+)
+def test_columns_of_a_log_that_leave_a_choice_are_refused(head, said, tmp_path):
+    text = log_text([str(k) for k in range(120)], head)
+    text = "\n".join(x + ",0" * (i > 0) for i, x in enumerate(text.splitlines()))
+    with pytest.raises(Refusal, match=said):
+        logs.read(written(tmp_path / "log.csv", text))
+
+
+@pytest.mark.parametrize(
+    ("cell", "place"),
+    [
+        ("1_5", "line 3, column|line 3: a row"),
+        ("１５", "line 3"),  # digits of another script
+        ("inf", "line 3"),
+        ("1,5", "line 3"),
+        ("0x1f", "line 3"),
+    ],
+)
+def test_cells_that_only_python_takes_for_numbers_are_refused(cell, place, tmp_path):
+    push = written(tmp_path / "push.csv", PLAIN.replace("0.50,", cell + ","))
+    with pytest.raises(Refusal, match=place):
+        penetration.read(rows.read(push, 10_000, ""))
+    tracks = "t," + ",".join(f"x{k},y{k}" for k in range(5)) + "\n"
+    tracks += "".join(f"{t},1,2,3,4,5,6,7,8,9,10\n" for t in range(15))
+    path = written(tmp_path / "t.csv", tracks.replace("\n1,1,", f"\n1,{cell},"))
+    with pytest.raises(Refusal, match="t.csv, line 3"):
+        reader.read(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("depth_mm\tforce_N\n1,234\t5,678\n2,345\t6,789\n", "line 2: '1,234' may have a decimal comma, or group"),
+        ('depth_mm,force_N\n"1,234","5,678"\n2,3\n', "line 2: '1,234' may have a decimal comma, or group"),
+        ("depth_mm;force_N\n0,5;1.5\n1,5;2,5\n", "line 2: a row must be 2 finite numbers"),
+        ("depth_mm,force_N\nm,N\n1,2\n2,3\n", "line 2: depth_mm is in m here: keep one"),
+        ("1,2\n2,3\n", "line 1: it has no header: its first line has 2 numbers"),
+        ("t,force_N\n1,2\n", "no column depth: it has 't, force_N'; it must have depth_m,force_N"),
+        ("depth (N),force_N\n1,2\n", "line 1: column depth .N. is in 'N': give it in m or cm"),
+        ("depth_mm,force_N\n1,2\n2\n3,4\n", "line 3: a row must be 2"),
+        ("Operator,5\ndepth_mm,force_N\n1,x\n2,3\n3,4\n", "line 3: a row must be 2"),
+    ],
+)  # fmt: skip
+def test_what_leaves_a_doubt_is_refused_by_place(text, said, tmp_path):
+    with pytest.raises(Refusal, match=said):
+        penetration.read(rows.read(written(tmp_path / "p.csv", text), 10_000, ""))
+
+
+@pytest.mark.filterwarnings("ignore::geomech.core.errors.Note")
+def test_every_reader_takes_units_behind_names(tmp_path):
+    """Rod drags, tables of drag, paths of intruders, plate drags, measured displacements, midlines of a gait."""
+    rod = "psi (rad);F_par (mN);F_perp (mN)\n0;470;30\n1,5;9;1408\n"
+    found = drag.read(written(tmp_path / "rod.csv", rod))
+    np.testing.assert_allclose(
+        found.rows[:3].T, [[0, 0.47, 0.03], [np.degrees(1.5), 0.009, 1.408]]
+    )
+    from geomech.mathematics.gaits import frames
+    from geomech.scenes.data import measurements
+    from geomech.scenes.format.columns import columns
+
+    path = "time (ms)\tx (mm)\tz [cm]\tangle_deg\n0\t0\t0\t90\n500\t1,5\t2,5\t180\n"
+    values = columns(
+        "place", written(tmp_path / "path.csv", path), ("t", "x", "z"), ("angle",)
+    )
+    assert [x[1] for x in values.values()] == pytest.approx([0.5, 1.5e-3, 0.025, np.pi])
+    plates = "beta (rad),gamma (rad),alpha_x (N/m^3),alpha_z (N/m³)\n3,1,2e6,3e6\n"
+    values = columns(
+        "place",
+        written(tmp_path / "p.csv", plates),
+        ("beta", "gamma", "alpha_x", "alpha_z"),
+    )
+    assert [x[0] for x in values.values()] == pytest.approx(
+        [np.degrees(3), np.degrees(1), 2, 3]
+    )
+    data = written(tmp_path / "d.csv", "amplitude (deg);value\n90;0,1\n")
+    assert measurements.read(data, scenes.load("three-link-viscous"))["value"][0] == 0.1
+    bends = "t (ms);x_mm;y_mm\n" + "".join(
+        f"{t};{k};{t * k},5\n" for t in range(4) for k in range(4)
+    )
+    read = frames.read(written(tmp_path / "b.csv", bends))
+    assert read.t.tolist() == [0, 0.001, 0.002, 0.003]
+    assert read.rows[-1] == pytest.approx([0.003, 3e-3, 9.5e-3])
+
+
+def log_text(times: list[str], head: str = "time,joint_1,joint_2,x,y,yaw") -> str:
+    """120 rows of two joints that move and a body that drifts."""
+    lines = [head]
+    for k, t in enumerate(times):
+        lines.append(
+            f"{t},{np.sin(k / 3):.6f},{np.cos(k / 3):.6f},{k},{2 * k},{k / 100}"
+        )
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("scale", "head", "told"),
+    [
+        (10**9, "time", "ns since 1970"), (10**9, "%time", "ns since 1970"), (10**9, "time_ns", "ns since 1970"),
+        (10**6, "t", "us since 1970"), (10**3, "time", "ms since 1970"), (1, "time_s", "s since 1970"),
+    ],
+)  # fmt: skip
+def test_times_since_1970_are_counted_from_the_first_row(scale, head, told, tmp_path):
+    """Steps of 16 and 17 ms, which a float of ns since 1970 does not hold."""
+    after = [k // 60 if scale == 1 else 0.0166 * k for k in range(120)]
+    after = np.arange(120.0) if scale == 1 else np.round(0.0166 * np.arange(120), 3)
+    times = [str(1506356466 * scale + round(x * scale)) for x in after]
+    text = log_text(times).replace("time", head, 1)
+    with pytest.warns(Note, match=told):
+        log = logs.read(written(tmp_path / "log.csv", text))
+    np.testing.assert_allclose(log.t, after, rtol=1e-12)
+    assert log.seconds
+
+
+def test_a_log_of_ros_is_read_by_its_columns_and_words_beside_them(tmp_path):
+    head = "%time,field.position0,field.position1,field.pose.x,field.pose.y,field.pose.theta"
+    text = log_text([str(1506356466 * 10**9 + k * 10**7) for k in range(120)], head)
+    text = "\n".join(f"{line},/world" for line in text.splitlines())
+    path = written(
+        tmp_path / "echo.csv", text.replace("theta,/world", "theta,frame_id")
+    )
+    with pytest.raises(
+        Refusal, match=r"no column x: it has '.*field\.pose\.x.*columns"
+    ):
+        logs.read(path)
+    with pytest.warns(Note, match="ns since 1970"):
+        log = logs.read(path, head.split(","))
+    assert log.t[1] == 0.01 and log.joints == ("field.position0", "field.position1")
+
+
+# Trackers.
+
+
+def tracks(frames: int = 15) -> np.ndarray:
+    """Five points (F, 5, 2) in pixels with y down."""
+    f, p = np.meshgrid(np.arange(frames), np.arange(5), indexing="ij")
+    return np.stack([100 + f + 20.0 * p, 300 - 2.0 * f + 3 * p], -1)
+
+
+def sleap(instances: list[tuple[str, np.ndarray]], score: float = 0.4) -> str:
+    names = ",".join(f"b{p}.x,b{p}.y,b{p}.score" for p in range(5))
+    lines = [f"track,frame_idx,instance.score,{names}"]
+    for frame in range(15):
+        for track, points in instances:
+            cells = [f"{x:.3f},{y:.3f},{score}" for x, y in points[frame]]
+            lines.append(f"{track},{frame},0.9,{','.join(cells)}")
+    return "\n".join(lines)
+
+
+def deeplabcut(individuals: dict[str, np.ndarray | None], score: float = 0.97) -> str:
+    """Points of animals; None for one that was never found."""
+    heads = [["scorer"], ["individuals"], ["bodyparts"], ["coords"]]
+    lines = [[str(k)] for k in range(15)]
+    for name, points in individuals.items():
+        count = 5 if points is None else points.shape[1]
+        for p in range(count):
+            for head, word in zip(heads, ("net", name, f"b{p}")):
+                head += [word] * 3
+            heads[3] += ["x", "y", "likelihood"]
+            for frame, line in enumerate(lines):
+                x, y = ("", "") if points is None else points[frame, p]
+                line += [str(x), str(y), "" if points is None else str(score)]
+    return "\n".join(",".join(line) for line in (*heads, *lines))
+
+
+def test_a_film_is_the_same_from_deeplabcut_and_sleap(tmp_path):
+    """y runs down in both, and a score of SLEAP of 0.4 is no likelihood."""
+    ours = reader.read(written(tmp_path / "s.csv", sleap([("a", tracks())])))
+    theirs = reader.read(written(tmp_path / "d.csv", deeplabcut({"a": tracks()})))
+    np.testing.assert_allclose(ours.points, theirs.points)
+    np.testing.assert_allclose(ours.points, tracks() * [1, -1])
+    scaled = reader.read(tmp_path / "s.csv", scale=0.5)
+    assert scaled.unit == "m"
+    plain = "t," + ",".join(f"x{p},y{p}" for p in range(5)) + "\n"
+    plain += "\n".join(
+        ",".join(map(str, [k, *x.ravel()])) for k, x in enumerate(tracks())
+    )
+    unsaid = reader.read(written(tmp_path / "p.csv", plain))
+    np.testing.assert_allclose(unsaid.points, tracks())
+    assert any("y is taken to run up" in note for note in unsaid.notes)
+
+
+def test_a_limit_that_drops_many_points_is_told_first(tmp_path):
+    path = written(tmp_path / "d.csv", deeplabcut({"a": tracks()}, 0.5))
+    assert np.isnan(reader.read(path).points).all()
+    assert "least_score" in reader.read(path).notes[0]
+    asked = written(tmp_path / "s.csv", sleap([("a", tracks())]))
+    assert np.isnan(reader.read(asked, least_score=0.6).points).all()
+    few = deeplabcut({"a": tracks()}).replace("0.97", "0.1", 7)  # of 75
+    assert not any("MANY" in x for x in reader.read(written(path, few)).notes)
+
+
+def test_individuals_without_points_are_left_out_unless_named(tmp_path):
+    dish = np.broadcast_to([[40.0, 50.0], [640.0, 50.0]], (15, 2, 2))
+    text = deeplabcut({"worm1": tracks(), "worm2": None, "single": dish})
+    path = written(tmp_path / "d.csv", text)
+    trial = reader.read(path)
+    np.testing.assert_allclose(trial.points, tracks() * [1, -1])
+    assert any("worm2" in note and "single" in note for note in trial.notes)
+    with pytest.raises(Refusal, match="2 points along the body"):
+        reader.read(path, individual="single")
+    both = deeplabcut({"a": tracks(), "b": tracks() + 9})
+    with pytest.raises(
+        Refusal, match="2 individuals are in it: a, b: name one by indi"
+    ):
+        reader.read(written(path, both))
+    np.testing.assert_allclose(
+        reader.read(path, individual="b").points, (tracks() + 9) * [1, -1]
+    )
+    for text in (
+        sleap([("a", tracks()), ("b", tracks() + 9)]),
+        "t,individual,point,x,y\n" + "".join(
+            f"{f},{name},{p},{x},{-y}\n" for name, xy in (("a", tracks()), ("b", tracks() + 9))
+            for f, points in enumerate(xy) for p, (x, y) in enumerate(points)
+        ),
+    ):  # fmt: skip
+        written(path, text)
+        with pytest.raises(Refusal, match="2 animals are in it: a, b"):
+            reader.read(path)
+        found = reader.read(path, individual="b")
+        np.testing.assert_allclose(found.points, (tracks() + 9) * [1, -1])
+        with pytest.raises(Refusal, match="'c' is unknown"):
+            reader.read(path, individual="c")
+
+
+def test_animals_without_a_track_and_labelled_frames_are_told_as_such(tmp_path):
+    path = written(tmp_path / "d.csv", sleap([("", tracks()), ("", tracks() + 9)]))
+    with pytest.raises(Refusal, match="2 animals without a track"):
+        reader.read(path)
+    labelled = deeplabcut({"a": tracks()}).replace(
+        "\n0,", "\nlabeled-data/film/img0.png,"
+    )
+    with pytest.raises(Refusal, match="line 5: .*labelled frames"):
+        reader.read(written(path, labelled))
+    spatial = deeplabcut({"a": tracks()}).replace("likelihood", "z")
+    with pytest.raises(Refusal, match="three dimensions"):
+        reader.read(written(path, spatial))
+
+
+WCON = {"units": {"t": "s", "x": "mm", "y": "mm"}, "data": [{"id": "1", "t": [0.0]}]}
+
+
+@pytest.mark.parametrize(
+    ("name", "raw", "said"),
+    [
+        (
+            "a.h5",
+            b"\x89HDF\r\n\x1a\n\0\0",
+            "HDF5 file: SLEAP writes CSV by .*DeepLabCut by",
+        ),
+        (
+            "a.wcon",
+            json.dumps(WCON).encode(),
+            "a WCON file .JSON.: write a row t,point,x,y",
+        ),
+        ("a.json", b'[{"x": 1}]', "it is JSON"),
+        ("a.xlsx", b"PK\x03\x04\x14\0", "spreadsheet.*: save the sheet as CSV"),
+        ("a.bag", b"#ROSBAG V2.0\n", "a ROS bag"),
+        (
+            "sysf_three_link.m",
+            b"function out = sysf()",
+            "a program of MATLAB.*drag_ratio",
+        ),
+    ],
+)
+def test_files_of_other_programs_are_known(name, raw, said, tmp_path):
+    path = written(tmp_path / name, raw)
+    for read in (reader.read, logs.read, drag.read):
+        with pytest.raises(Refusal, match=said):
+            read(path)
+
+
+def test_programs_of_sysplotter_are_no_files_of_theirs(tmp_path):
+    for read in (scenes.load, tables.load):
+        path = written(
+            tmp_path / "sysf_three_link.m", "function output = sysf_three_link(x)"
+        )
+        with pytest.raises(
+            Refusal, match=r"program of MATLAB.*linklengths.*drag_ratio"
+        ):
+            read(path)
+    path = written(tmp_path / "shchf_circle.m", "function output = shchf_circle(x)")
+    with pytest.raises(Refusal, match="program of MATLAB.*XV"):
+        Shchf(file=str(path))
+
+
+def test_an_option_tells_what_a_file_is(tmp_path):
+    """A file whose header does not say is what an option is for; one that cannot be read is refused as that."""
+    path = written(tmp_path / "a.csv", "a,b\n1,2\n2,3\n")
+    code, _, err = geomech("fit-gait", path, "--fps", "30")
+    assert code == 2 and "points" in err and "drop" not in err
+    code, _, err = geomech("fit-gait", written(path, "1,2\n2,3\n"), "--fps", "30")
+    assert code == 2 and "no header" in err
+    code, _, err = geomech("fit-gait", written(path, log_text(["0"])), "--fps", "30")
+    assert code == 2 and "--fps belongs to midlines" in err and "joint_1" in err
