@@ -1,0 +1,533 @@
+"""Small bugs put into the code on purpose, to see whether a test notices. By hand, not collected by pytest:
+
+    python tests/tools/mutants.py calls.txt --measure
+    python tests/tools/mutants.py calls.txt --count 200 --seed 1 --jobs 2 [--only rft/laws rft/bodies]
+    python tests/tools/mutants.py calls.txt --count 200 --seed 1 --map map.jsonl
+    python tests/tools/mutants.py calls.txt --needed map.jsonl
+
+The first line runs the suite and the examples of docstrings once and notes which functions each test calls, and its
+seconds. A mutant then meets the tests that call the function in which it stands (of a constant: any of its class, file
+or folder), quickest first, and as far as `ENOUGH` seconds go, the rest of their files, which may look at what a fixture
+or a cache holds. `mutants.toml` beside this file names the tests of what Python does not see called, what is left out
+and which mutants are no bugs. Mutants live in copies of the tree in the system's temporary folder, one a worker; the
+checkout is only read. A mutant is killed when a test fails; time-outs, far longer than without it, are counted apart.
+Survivors are printed as what they change.
+`--done 50` goes on with a run that was stopped after 50. `--rooms laws shell` measures the tests of these folders of
+`tests/` alone, for a change of one room.
+
+`--map` lets all tests of a mutant run, not only as far as the first that fails, and adds a line for each mutant to a
+file: what it changes, and which tests notice. `--needed` reads such files and prints a set of tests that notices every
+mutant that any test noticed, cheapest first as far as a greedy choice goes, and the tests that it does without.
+"""
+
+import argparse
+import ast
+import collections
+import copy
+import difflib
+import importlib
+import inspect
+import itertools
+import json
+import os
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = "rft/", "geomech/"
+TABLE = tomllib.loads((ROOT / "tests/tools/mutants.toml").read_text())
+# In one process and without time limits of its own, whatever the suite's settings are.
+PYTEST = ["-q", "--doctest-modules", "--assert=plain", "-p", "no:cacheprovider"]
+PYTEST += ["-o", "addopts=", "-o", "timeout=0", "-m", "not soak and not benchmark"]
+ENOUGH = 60  # s of CPU that the tests of one mutant may take
+# Loaded once, before each mutant's process splits off.
+HEAVY = "pytest numpy scipy.interpolate scipy.special scipy.stats sympy mpmath matplotlib.pyplot xarray"
+CLEAN = {
+    "PYTHONDONTWRITEBYTECODE": "1",
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MPLBACKEND": "agg",
+}
+
+SWAPPED = {
+    ast.Add: ast.Sub,
+    ast.Sub: ast.Add,
+    ast.Mult: ast.Div,
+    ast.Div: ast.Mult,
+    ast.Pow: ast.Mult,
+}
+SWAPPED |= {
+    ast.FloorDiv: ast.Mult,
+    ast.Mod: ast.FloorDiv,
+    ast.BitAnd: ast.BitOr,
+    ast.BitOr: ast.BitAnd,
+}
+BORDER = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt}
+OPPOSITE = {
+    ast.Lt: ast.GtE,
+    ast.LtE: ast.Gt,
+    ast.Gt: ast.LtE,
+    ast.GtE: ast.Lt,
+    ast.Eq: ast.NotEq,
+    ast.NotEq: ast.Eq,
+}
+OPPOSITE |= {ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn, ast.NotIn: ast.In}
+PAIRS = "minimum maximum, min max, sin cos, real imag, any all, zeros ones, zeros_like ones_like, floor ceil, sum mean"
+TWIN = {
+    p[i]: p[1 - i]
+    for p in map(str.split, (PAIRS + ", argmin argmax, exp expm1").split(","))
+    for i in (0, 1)
+}
+EITHER_WAY = "max min maximum minimum fmax fmin hypot distance pose_distance dot plus"  # functions of two arguments
+
+
+class Mutant(NamedTuple):
+    file: str
+    line: int
+    scope: str  # qualified name of the function or class around it, "" outside of all
+    source: str  # of the whole file
+    mutated: str
+
+    def change(self) -> str:
+        """The lines taken away (-) and put in (+)."""
+        lines = difflib.unified_diff(
+            self.source.splitlines(), self.mutated.splitlines(), n=0, lineterm=""
+        )
+        return "\n".join(x[0] + " " + x[1:].strip() for x in list(lines)[3:])
+
+
+def variants(node):
+    """(part, replacement) for every wrong form of a syntax node."""
+
+    def with_(**fields):
+        new = copy.copy(node)
+        vars(new).update(fields)
+        return node, new
+
+    match node:
+        case ast.BinOp(op=op) if type(op) in SWAPPED:
+            yield with_(op=SWAPPED[type(op)]())
+        case ast.Compare(ops=ops):
+            for k, op in enumerate(ops):
+                others = [
+                    table[type(op)]()
+                    for table in (BORDER, OPPOSITE)
+                    if type(op) in table
+                ]
+                yield from (
+                    with_(ops=[*ops[:k], other, *ops[k + 1 :]]) for other in others
+                )
+        case ast.BoolOp(op=op):
+            yield with_(op=ast.And() if isinstance(op, ast.Or) else ast.Or())
+        case ast.UnaryOp(op=ast.USub() | ast.Not() | ast.Invert()):
+            yield node, node.operand
+        case ast.Constant(value=bool(x)):
+            yield node, ast.Constant(not x)
+        case ast.Constant(value=x) if isinstance(x, (int, float, complex)):
+            yield from ((node, ast.Constant(y)) for y in ((2 * x, -x) if x else (1,)))
+        case ast.Attribute(attr=name) if name in TWIN:
+            yield with_(attr=TWIN[name])
+        case ast.Call(args=args, keywords=given):
+            yield from (
+                with_(keywords=[*given[:k], *given[k + 1 :]]) for k in range(len(given))
+            )
+            either_way = (
+                len(args) == 2
+                and ast.unparse(node.func).rpartition(".")[2] in EITHER_WAY.split()
+            )
+            told_apart = len({*map(ast.dump, args[:2])}) == 2 and not any(
+                isinstance(x, ast.Starred) for x in args[:2]
+            )
+            if told_apart and not either_way:
+                yield with_(args=[args[1], args[0], *args[2:]])
+        case ast.If(test=test) | ast.IfExp(test=test):
+            yield test, ast.UnaryOp(ast.Not(), test)
+        case ast.Return(value=ast.BinOp() | ast.UnaryOp() | ast.Call() as value):
+            yield value, ast.UnaryOp(ast.USub(), value)
+        case (
+            ast.AugAssign()
+            | ast.Raise()
+            | ast.Expr(value=ast.Call())
+            | ast.Assign(targets=[ast.Subscript()])
+        ):
+            yield node, ast.Pass()
+
+
+def nodes(tree):
+    """The nodes of a tree that may be mutated: not texts, annotations, decorators, nor what the table says to skip."""
+    for field, value in ast.iter_fields(tree):
+        for node in value if isinstance(value, list) else [value]:
+            plain = isinstance(node, ast.AST) and field not in (
+                "annotation",
+                "returns",
+                "decorator_list",
+            )
+            name = (
+                ast.unparse(node.targets[0])
+                if isinstance(node, ast.Assign)
+                else getattr(node, "name", None)
+            )
+            if (
+                plain
+                and name not in TABLE["skip"]
+                and not isinstance(node, ast.JoinedStr)
+            ):
+                yield node
+                yield from () if isinstance(node, ast.Raise) else nodes(node)
+
+
+def scopes(node, name=""):
+    """(first line, last line, qualified name) of a tree and of each function and class in it, outer ones first."""
+    if isinstance(node, ast.Module):
+        yield 0, sys.maxsize, name
+    for x in ast.iter_child_nodes(node):
+        if isinstance(x, (ast.FunctionDef, ast.ClassDef)):
+            yield x.lineno, x.end_lineno, name + x.name
+            yield from scopes(
+                x, f"{name}{x.name}." + "<locals>." * isinstance(x, ast.FunctionDef)
+            )
+        else:
+            yield from scopes(x, name)
+
+
+def mutants_of(path: Path) -> list[Mutant]:
+    file, text = path.relative_to(ROOT).as_posix(), path.read_bytes()
+    starts = [0, *(i + 1 for i, byte in enumerate(text) if byte == 10)]
+    tree, found = ast.parse(text), {}
+    around = list(scopes(tree))
+    for part, new in (v for node in nodes(tree) for v in variants(node)):
+        low, high = (
+            starts[part.lineno - 1] + part.col_offset,
+            starts[part.end_lineno - 1] + part.end_col_offset,
+        )
+        code = ast.unparse(ast.fix_missing_locations(new))
+        bare = isinstance(new, (ast.stmt, ast.Name)) or (
+            isinstance(new, ast.Constant) and "-" not in code
+        )
+        mutated = (
+            text[:low] + (code if bare else f"({code})").encode() + text[high:]
+        ).decode()
+        scope = [name for first, last, name in around if first <= part.lineno <= last][
+            -1
+        ]
+        found[mutated] = Mutant(file, part.lineno, scope, text.decode(), mutated)
+    return list(found.values())
+
+
+def outwards(place: str) -> Iterator[str]:
+    """A place (a file, a dot and a qualified name), the function or class around it, and so on to the file and folders."""
+    while place:
+        yield place
+        place = place.rpartition("." if ".py." in place else "/")[0]
+
+
+class Calls:
+    """A plugin of pytest that writes a line for each test: its CPU time, and the functions of the project it calls."""
+
+    def __init__(self, tree: Path, file: Path):
+        self.tree, self.file = f"{tree}/", file
+
+    def pytest_runtest_logstart(self, nodeid):
+        self.codes, self.failed, self.start = {}, False, sum(os.times()[:4])
+        threading.settrace(self.note)
+        sys.settrace(self.note)
+
+    def note(self, frame, *_):
+        self.codes[id(frame.f_code)] = frame.f_code  # whose hash takes long
+
+    def pytest_runtest_logreport(self, report):
+        self.failed |= report.failed
+
+    def pytest_runtest_logfinish(self, nodeid):
+        sys.settrace(None)
+        threading.settrace(None)
+        calls = set()
+        for code in self.codes.values():
+            if (
+                code.co_filename.startswith(self.tree)
+                and code.co_flags & inspect.CO_OPTIMIZED
+            ):  # no class, no module
+                name = code.co_qualname.partition(".<locals>.<")[
+                    0
+                ]  # what is around a lambda
+                calls.add(f"{code.co_filename.removeprefix(self.tree)}.{name}")
+        calls = sorted(x for x in calls if x.startswith(PACKAGES))
+        if not self.failed:
+            with self.file.open("a") as file:
+                print(
+                    json.dumps(
+                        [nodeid, round(sum(os.times()[:4]) - self.start, 3), calls]
+                    ),
+                    file=file,
+                )
+
+
+class Watch:
+    """The tests that watch a mutant, from a file that `Calls` wrote."""
+
+    def __init__(self, file: Path):
+        self.seconds, self.calling = (
+            {},
+            collections.defaultdict(set),
+        )  # by test; and tests by place
+        for line in file.open():
+            test, self.seconds[test], calls = json.loads(line)
+            for place in {place for call in calls for place in outwards(call)}:
+                self.calling[place].add(test)
+
+    def over(self, m: Mutant) -> list[str]:
+        """The tests to be run on a mutant, file by file, the quickest first."""
+        if named := TABLE["tests"].get(m.file):
+            near = {test for test in self.seconds if file_of(test) in named}
+        else:
+            places = outwards(f"{m.file}.{m.scope}".rstrip("."))
+            near = next((self.calling[x] for x in places if x in self.calling), set())
+        files, some, sums = {file_of(test) for test in near}, [], collections.Counter()
+        every = (test for test in self.seconds if file_of(test) in files)
+        for test in sorted(
+            every, key=lambda test: (test not in near, self.seconds[test])
+        ):
+            if sums.total() < ENOUGH:
+                some.append(test)
+                sums[file_of(test)] += self.seconds[test]
+        return sorted(some, key=lambda test: (sums[file_of(test)], file_of(test)))
+
+
+def file_of(test: str) -> str:
+    """The name of a test's file, as the table has it; examples of docstrings are one file."""
+    file = test.partition("::")[0]
+    return (
+        Path(file).stem.removeprefix("test_")
+        if file.startswith("tests/")
+        else "examples"
+    )
+
+
+def start(
+    tree: Path,
+    tests: list[str],
+    seconds: float,
+    *options: str,
+    plugins=(),
+    until_end: bool = False,
+) -> int:
+    """The id of a new process that runs some tests in a copy of the tree, with so much CPU time at most: up to the
+    first file in which one fails, or all of them."""
+    if child := os.fork():
+        return child
+    try:
+        resource.setrlimit(resource.RLIMIT_CPU, (int(seconds),) * 2)
+        resource.setrlimit(resource.RLIMIT_AS, (8 << 30,) * 2)
+        signal.alarm(int(10 * seconds))  # for what sleeps
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        os.dup2(1, 2)
+        os.chdir(tree)
+        os.environ["PYTHONPATH"] = sys.path[0] = str(tree)
+        worst = 0
+        for _, some in itertools.groupby(tests, file_of):  # each is read in its turn
+            arguments = [*PYTEST, *options, *some]
+            status = importlib.import_module("pytest").main(arguments, plugins)
+            worst = worst or status
+            if worst and not until_end:
+                break
+        os._exit(worst)
+    finally:
+        os._exit(1)
+
+
+def copied(tree: Path) -> Path:
+    """A copy of what git follows."""
+    listed = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True, text=True
+    )
+    for name in filter(None, listed.stdout.split("\0")):
+        (tree / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, tree / name)
+    return tree
+
+
+class Failures:
+    """A plugin of pytest that writes which tests fail."""
+
+    def __init__(self, file: Path):
+        self.file = file
+
+    def pytest_runtest_logreport(self, report):
+        if report.failed:
+            with self.file.open("a") as file:
+                print(report.nodeid, file=file)
+
+
+def needed(files: list[Path], watch: Watch) -> None:
+    """Print tests that notice all mutants of some maps together, and those that are not needed for it."""
+    noticed = {}
+    for file in files:
+        for line in file.open():
+            change, tests = json.loads(line)
+            if tests:
+                noticed[change] = {*tests}
+    every = {test for tests in noticed.values() for test in tests}
+    left, chosen = {*noticed}, []
+    while left:
+        gain = {
+            test: sum(test in noticed[change] for change in left)
+            / (0.01 + watch.seconds.get(test, 0.0))
+            for test in every
+        }
+        best = max(gain, key=gain.get)
+        chosen.append(best)
+        left -= {change for change in left if best in noticed[change]}
+        every.discard(best)
+    print(f"{len(noticed)} mutants are noticed by {len(chosen)} tests:")
+    print(*chosen, sep="\n")
+    rest = sorted({*watch.seconds} - {*chosen})
+    print(f"\n{len(rest)} tests are not needed for it:")
+    print(*rest, sep="\n")
+
+
+def measure(file: Path, folder: Path, rooms: list[str]) -> None:
+    """Write what each test calls, with a process for each file of tests."""
+    tree = copied(folder / "0")
+    file.write_text("")
+    files = []
+    for path in sorted(ROOT.glob("tests/*/test_*.py")):
+        chosen = not rooms or path.parent.name in rooms
+        if chosen and file_of(f"tests/{path.name}") not in TABLE["sources"]:
+            files.append(path.relative_to(ROOT).as_posix())
+    runs = [[file] for file in files]
+    if not rooms:
+        runs.append(list(PACKAGES))
+    for some in runs:
+        child = start(tree, some, 1200, plugins=[Calls(tree, file.absolute())])
+        print(
+            *some,
+            "fails, or is skipped whole" if os.waitpid(child, 0)[1] else "",
+            flush=True,
+        )
+
+
+def hunted(
+    some: list[Mutant], watch: Watch, folder: Path, jobs: int, map_file: Path | None
+) -> Iterator[tuple[Mutant, str]]:
+    """Each with "survived", "killed" or "time-out", so many at a time, each in a copy of the tree below ``folder``."""
+    trees, running, todo = (
+        [copied(folder / str(k)) for k in range(jobs)],
+        {},
+        iter(some),
+    )
+    tests = sorted({test for m in some for test in watch.over(m)})
+    if os.waitpid(start(trees[0], tests, 600, "--collect-only"), 0)[1]:
+        sys.exit("there are other tests now: --measure anew")
+    while (m := next(todo, None)) or running:
+        if m:
+            tree, tests = trees.pop(), watch.over(m)
+            (tree / m.file).write_text(m.mutated)
+            seconds = 30 + 3 * sum(watch.seconds[x] for x in tests)
+            if map_file:
+                (tree / "failed.txt").write_text("")
+                failures = Failures(tree / "failed.txt")
+                child = start(tree, tests, seconds, plugins=[failures], until_end=True)
+            else:
+                child = start(tree, tests, seconds, "-x")
+            running[child] = m, tree
+        if not trees or not m:
+            child, status = os.wait()
+            done, tree = running.pop(child)
+            (tree / done.file).write_text(done.source)
+            trees.append(tree)
+            if map_file:
+                failed = sorted({*(tree / "failed.txt").read_text().splitlines()})
+                change = f"{done.file}:{done.line}\n{done.change()}"
+                with map_file.open("a") as file:
+                    print(json.dumps([change, failed]), file=file)
+            late = os.WIFSIGNALED(status) and os.WTERMSIG(status) in (
+                signal.SIGKILL,
+                signal.SIGXCPU,
+                signal.SIGALRM,
+            )
+            yield done, "time-out" if late else "killed" if status else "survived"
+
+
+def report(asked: argparse.Namespace, folder: Path) -> None:
+    files = sorted(
+        p.relative_to(ROOT).as_posix()
+        for top in PACKAGES
+        for p in (ROOT / top).rglob("*.py")
+    )
+    files = [
+        f
+        for f in files
+        if f.startswith(tuple(asked.only))
+        and not f.startswith(tuple(TABLE["unwatched"]))
+    ]
+    every = [m for f in files for m in mutants_of(ROOT / f)]
+    some = random.Random(asked.seed).sample(every, min(asked.count, len(every)))[
+        asked.done :
+    ]
+    print(f"{len(some)} of {len(every)} mutants, seed {asked.seed}", flush=True)
+    known = {
+        (x["file"], x["change"].strip()): x["why"] for x in TABLE.get("equivalent", ())
+    }
+    counts = collections.Counter()
+    for m, outcome in hunted(some, Watch(asked.calls), folder, asked.jobs, asked.map):
+        why = known.get((m.file, m.change())) if outcome == "survived" else None
+        counts["no bug" if why else outcome] += 1
+        more = (
+            f" no bug: {why}"
+            if why
+            else f"\n{m.change()}"
+            if outcome == "survived"
+            else ""
+        )
+        print(f"{outcome:8} {m.file}:{m.line}{more}", flush=True)
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    told = ", ".join(f"{count} {outcome}" for outcome, count in sorted(counts.items()))
+    print(f"\n{told}; {(used.ru_utime + used.ru_stime) / 60:.1f} minutes of CPU")
+
+
+def main() -> None:
+    ask = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    ask.add_argument("calls", type=Path, help="the file of what each test calls")
+    ask.add_argument("--measure", action="store_true", help="write it")
+    ask.add_argument("--count", type=int, default=200, help="how many, at random")
+    ask.add_argument("--seed", type=int, default=1)
+    ask.add_argument(
+        "--done",
+        type=int,
+        default=0,
+        help="so many of them are left out: a stopped run had them",
+    )
+    ask.add_argument("--jobs", type=int, default=2)
+    ask.add_argument("--only", nargs="+", default=[""], help="beginnings of file names")
+    ask.add_argument("--rooms", nargs="+", default=[], help="folders of tests/")
+    ask.add_argument("--map", type=Path, help="add which tests notice each mutant")
+    ask.add_argument("--needed", nargs="+", type=Path, help="read such maps")
+    asked = ask.parse_args()
+    if asked.needed:
+        needed(asked.needed, Watch(asked.calls))
+        return
+    os.environ.update(CLEAN)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # clean up then too
+    for name in HEAVY.split():
+        importlib.import_module(name)
+    with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
+        if asked.measure:
+            measure(asked.calls, Path(folder), asked.rooms)
+        else:
+            report(asked, Path(folder))
+
+
+if __name__ == "__main__":
+    main()
