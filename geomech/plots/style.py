@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, get_origin
 
 from geomech.io.files import atomic_file
+from geomech.plots.shown import ShownAxes, ShownFigure
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
@@ -96,8 +97,6 @@ def blank(width: float, height: float, layout: str = "constrained") -> Any:
 
     width, height: in inches. layout: "constrained", or "compressed", which closes the
     gaps in a row of maps."""
-    from geomech.plots.shown import ShownFigure
-
     fig = ShownFigure(figsize=(width, height), layout=layout)
     fig.get_layout_engine().set(wspace=0.06)
     return fig
@@ -124,8 +123,6 @@ def figure(
     >>> axes.shape
     (1, 2)
     """
-    from geomech.plots.shown import ShownAxes
-
     fig = blank(width, height, layout)
     subplot = {"axes_class": ShownAxes}
     axes = fig.subplots(

@@ -14,6 +14,7 @@ from geomech.io import results as io
 from geomech.io.files import write_text
 from geomech.results.kinds import kind_of
 from geomech.results.old import translated
+from geomech.results.show import text
 from rft.core.refusal import Refusal
 
 to_dict = io.to_dict
@@ -57,8 +58,6 @@ def write_csv(path: Path, result: Result) -> None:
 
 def write_txt(path: Path, result: Result) -> None:
     """Write all variables as a terminal shows them."""
-    from geomech.results.show import text
-
     write_text(path, text(result, everything=True) + "\n")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from geomech.core.variables import Result
+from geomech.scenes.read import medium_in, parse
 from rft.core.refusal import Refusal
 
 
@@ -44,16 +45,12 @@ def fitted_medium(result: Result) -> Any:
     >>> moved["net_distance"].values.round(3)
     array([[0.05]])
     """
-    from geomech.scenes.read import medium_in
-
     if "medium_toml" not in result.attributes:
         raise Refusal("this result has no medium", instead="give one of ``fit_medium``")
     return medium_in(result.attributes["medium_toml"])
 
 
 def _parsed(result: Result, attribute: str) -> Any:
-    from geomech.scenes.read import parse
-
     if attribute not in result.attributes:
         raise Refusal(
             "the file of this result does not have its scene",

@@ -31,6 +31,7 @@ from geomech.run.executors import Executor
 from geomech.run.pending import TaskQueue
 from geomech.run.store import CHECKPOINT, Busy, Store
 from geomech.run.tasks import compute, result_type
+from geomech.scenes.kinds import code
 from rft.core.refusal import Refusal
 
 
@@ -203,8 +204,6 @@ def inline_runner() -> contextlib.AbstractContextManager[Runner]:
 def digest_context(files: Iterable[Path]) -> tuple:
     """Return all data that results depend on besides tasks and arguments: plug-ins, and
     the content of files."""
-    from geomech.scenes.kinds import code
-
     contents = []
     for path in files:
         if path.is_file():

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 from geomech.run.backend import VERSION, one_thread, preferring
+from geomech.scenes import kinds
 from rft.core.refusal import Refusal
 
 
@@ -67,8 +68,6 @@ def result_type(task: Callable) -> Any:
 def pack(task: Callable, common: Any, back_end: str) -> TaskPayload:
     """Return the payload of a task; `NotPicklable` if no other process could load
     it."""
-    from geomech.scenes import kinds
-
     classes = kinds.registered()
     for module, name in classes:
         if module == "__main__" or "<locals>" in name:
@@ -112,8 +111,6 @@ def load_task(payload: TaskPayload) -> tuple[Callable, Any]:
 
 def register_plugins(payload: TaskPayload) -> None:
     """Register the classes of plug-ins."""
-    from geomech.scenes import kinds
-
     for name, text in payload.plugins:
         kinds.load_text(name, text)
     for module, name in payload.classes:

@@ -29,6 +29,7 @@ from geomech.scenes.medium import MEDIUM
 from geomech.scenes.model import SWIMMER, Scene, checked_scene
 from geomech.scenes.read import from_tables
 from rft.core.refusal import Refusal, located
+from rft.terradynamics.plates.stress import COEFFICIENTS
 
 if TYPE_CHECKING:
     from geomech.scenes.terradynamics.intruding import Intruding
@@ -111,8 +112,6 @@ def medium_toml(name: str, entry) -> str:
 def vertical_toml(name: str, entry) -> str:
     """Return the table of a medium of intruder scenes
     (`rft.terradynamics.plates.VerticalEntry`), with its source in comments above."""
-    from rft.terradynamics.plates.stress import COEFFICIENTS
-
     lines = textwrap.wrap(f"{name}: {entry.source}", COMMENT_WIDTH)
     lines.append("coefficients in N/cm^3, times zeta")
     stress = dataclasses.asdict(entry.stress)

@@ -10,6 +10,7 @@ import numpy as np
 from geomech.core.variables import Result, Variable
 from geomech.mathematics.geometry.representations.tube import TaylorSeries
 from geomech.plots.maps import TITLES, draw_arrow, row_name
+from geomech.plots.shown import ShownAxes
 from geomech.plots.style import figure, quantity, styled
 from geomech.results.measured import series_of
 
@@ -29,8 +30,6 @@ def measured_figure(result: Result) -> Figure:
     The left column has the shapes of the first two joints and the net displacement, the
     middle the rows of A along the mean gait with bands, and the right the net poses of
     the cycles as logged, against those that the connection predicts."""
-    from geomech.plots.shown import ShownAxes
-
     series = series_of(result)
     fig, axes = figure(10.8, 6.6, 3, 3, width_ratios=(1.4, 1.2, 1.0))
     for ax in axes[:, 0]:

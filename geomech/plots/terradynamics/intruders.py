@@ -9,6 +9,7 @@ import numpy as np
 
 from geomech.plots.maps import draw_colours, largest
 from geomech.plots.style import figure, styled
+from geomech.scenes.terradynamics.solid import MeshIntrusion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -140,8 +141,6 @@ def intrusion_figure(scene: Any, result: Any) -> Any:
 
 def _draw_largest_force(ax: Any, scene: Any, columns: dict[str, np.ndarray]) -> None:
     """Draw the mesh of an intruder where the force is largest, on 3-D axes."""
-    from geomech.scenes.terradynamics.solid import MeshIntrusion
-
     force = np.stack([columns[f"force_{axis}"] for axis in "xyz"], -1)
     step = int(np.linalg.norm(force, axis=-1).argmax())
     trajectory = scene.motion.trajectory(scene.mesh)

@@ -17,6 +17,7 @@ from types import UnionType
 from typing import TYPE_CHECKING, Any, ClassVar, Union, get_args, get_origin
 
 from geomech.results.kinds import Plain
+from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
     from geomech.core.variables import Result
@@ -204,7 +205,6 @@ def subject_facts(subject: Any) -> dict[str, str]:
     """Return what every result says of its subject: its name and, of a scene, its text,
     from which pictures are drawn again. A scene with parts of Python alone has none."""
     from geomech.scenes import toml
-    from rft.core.refusal import Refusal
 
     if not hasattr(subject, "name"):
         return {}

@@ -12,6 +12,7 @@ from geomech.core.variables import POSE, Result, Variable
 from geomech.questions.shared import loading, names, parsing, tools
 from geomech.questions.shared.base import Option, Question, Run, Subject
 from geomech.questions.shared.common import CurvePanels
+from geomech.questions.shared.texts import measurements
 from geomech.results.numbers import size
 from geomech.run.cost import Cost
 from rft.core.refusal import Refusal
@@ -204,8 +205,6 @@ def measured_points(data: Any, scene: Any, component: Sequence[str]) -> Any:
     """Return measurements to be drawn: those of a file, which are of the quantity of
     one panel, or values as they are."""
     from pathlib import Path
-
-    from geomech.questions.shared.texts import measurements
 
     if not isinstance(data, str | Path):
         return data
