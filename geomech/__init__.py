@@ -5,21 +5,21 @@
     study.ccf().plot()                        # also .connection(), .optimise()
 
 study, Study                            a scene, and methods that ask questions of it
-displacement, ccf, sweep, optimise (optimize), forces, velocity, trajectory, walk, intrude
-grains                                  the same of any scene; results that print themselves
-drag_grains                             drag on a rod in beds of grains
-load_result, best_scene, fitted_medium  results from files; scenes and media that results have
-tiers, workers, accuracy                methods of prediction; processes; error against time
-load, Scene, Swimmer, Numerics, toml    scenes: read, built and written
-medium                                  a medium of the vertical plane, by name or from a file
-media, bodies, gaits, effects, systems  the parts of scenes; `register` adds custom ones
-connection, curvature, reconstruct      the geometry of any velocity(alpha, alphadot)
-symbolic                                formulas of connections and CCFs
-fit_medium, fit_gait, fitted_gait       media and gaits fitted to measurements
-measured, fit_log                       logs and midlines, stage by stage
-plots, undulation                       figures; swimmers that undulate
-Refusal                                 the error for whatever makes no sense: a ValueError with its facts
-On the command line: `geomech --help`; every key of a scene file: `geomech reference`.
+displacement, ccf, sweep, optimise (optimize), forces, velocity, trajectory, walk,
+intrude grains                                  the same of any scene; results that
+print themselves drag_grains                             drag on a rod in beds of grains
+load_result, best_scene, fitted_medium  results from files; scenes and media that
+results have tiers, workers, accuracy                methods of prediction; processes;
+error against time load, Scene, Swimmer, Numerics, toml    scenes: read, built and
+written medium                                  a medium of the vertical plane, by name
+or from a file media, bodies, gaits, effects, systems  the parts of scenes; `register`
+adds custom ones connection, curvature, reconstruct      the geometry of any
+velocity(alpha, alphadot) symbolic                                formulas of
+connections and CCFs fit_medium, fit_gait, fitted_gait       media and gaits fitted to
+measurements measured, fit_log                       logs and midlines, stage by stage
+plots, undulation                       figures; swimmers that undulate Refusal
+the error for whatever makes no sense: a ValueError with its facts On the command line:
+`geomech --help`; every key of a scene file: `geomech reference`.
 """
 
 from __future__ import annotations

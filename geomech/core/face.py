@@ -1,8 +1,8 @@
 """Methods of values that need the layers above them: display in notebooks, conversion,
 loading.
 
-Such a method calls the function that `implementation` returns. `geomech.shell.face`, imported
-with the package, registers these functions."""
+Such a method calls the function that `implementation` returns. `geomech.shell.face`,
+imported with the package, registers these functions."""
 
 from __future__ import annotations
 

@@ -54,11 +54,12 @@ def observation(qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
     In order: height; the vertical, and the velocity of the trunk, along its axes; its
     angular velocity; cosines, sines and rates of the legs."""
     w, x, y, z = np.moveaxis(qpos[..., 3:7], -1, 0)
-    turn = np.stack([
-        np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], -1),
-        np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], -1),
-        np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], -1),
-    ], -2)  # fmt: skip
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    turn = np.stack([np.stack(row, -1) for row in rows], -2)
     velocity = np.einsum("...ij,...i->...j", turn, qvel[..., :3])
     legs = qpos[..., 7:]
     parts = (

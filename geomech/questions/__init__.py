@@ -1,9 +1,10 @@
 """Questions, one a file: its fields, its checks, its computation, its headline and its
 picture.
 
-A new one is a file in a room and a line here. Its command, its method of `geomech.study(...)`,
-its reference and JSON Schema, the digest under which an interrupted computation is
-resumed, files of all formats and its form in a notebook follow from its class.
+A new one is a file in a room and a line here. Its command, its method of
+`geomech.study(...)`, its reference and JSON Schema, the digest under which an
+interrupted computation is resumed, files of all formats and its form in a notebook
+follow from its class.
 """
 
 from importlib import import_module
@@ -28,7 +29,9 @@ GROUPS = {
         "swimmers.trajectory": "Follow the body through its gait.",
     },
     "Grains and robots": {
-        "terradynamics.stress": "Compute the stress of grains on a plate per unit depth.",
+        "terradynamics.stress": (
+            "Compute the stress of grains on a plate per unit depth."
+        ),
         "terradynamics.intrude": "Compute force and moment of grains on a moving body.",
         "terradynamics.walk": "Compute how a robot walks on grains.",
         "grains.grains": "Let rigid links swim in a bed of grains, beside the tiers.",

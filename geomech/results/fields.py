@@ -17,7 +17,8 @@ from geomech.mathematics.geometry.stretch import Stretch
 
 @dataclass(frozen=True, eq=False)
 class Slice:
-    """A plane of shape space as a result has it (`geomech.mathematics.geometry.representations.plane.Plane`)."""
+    """A plane of shape space as a result has it
+    (`geomech.mathematics.geometry.representations.plane.Plane`)."""
 
     pair: tuple[int, int]
     at: tuple[float, ...]

@@ -89,7 +89,8 @@ class Cost(NamedTuple):
             raise TooLong(
                 str(self),
                 where=place,
-                instead=f"to compute for more than {limits} say ``yes``, or {cheaper_alternative}",
+                instead=f"to compute for more than {limits} say ``yes``, or "
+                f"{cheaper_alternative}",
             )
 
 

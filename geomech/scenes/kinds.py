@@ -18,7 +18,9 @@ from pathlib import Path
 from typing import Any
 
 from geomech.io.files import read_text
-from geomech.mathematics import gaits, systems, tiers  # noqa: F401  which have registries
+
+# These have registries.
+from geomech.mathematics import gaits, systems, tiers  # noqa: F401
 from geomech.mathematics.systems.functions import class_from_function
 from geomech.scenes import sources
 from rft.core.refusal import Refusal, formatted, located

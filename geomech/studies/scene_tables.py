@@ -239,7 +239,8 @@ class SceneTables:
 
     @property
     def two_form(self) -> TwoForm:
-        """CCF of all pairs of joints, of any number (`geomech.mathematics.geometry.two_form`)."""
+        """CCF of all pairs of joints, of any number
+        (`geomech.mathematics.geometry.two_form`)."""
         key = self._connection_table().key
         return self._stored("two-form", key, lambda: two_form(self.fitted)).table
 
@@ -259,9 +260,9 @@ class SceneTables:
 
     @property
     def metric(self) -> Metric | Finsler:
-        """Cost of changes of shape on the field's grid (`geomech.mathematics.geometry.metric`): a
-        quadratic form where xi = A alphadot, else a norm. Refusal if the system has
-        none."""
+        """Cost of changes of shape on the field's grid
+        (`geomech.mathematics.geometry.metric`): a quadratic form where xi = A alphadot,
+        else a norm. Refusal if the system has none."""
         return self.compute_metric()
 
     def compute_metric(self, progress: Callable | None = None) -> Metric | Finsler:
@@ -346,8 +347,9 @@ class SceneTables:
         gait: Gait | None = None,
         progress: Callable | None = None,
     ) -> Result:
-        """Return the net poses (`geomech.studies.tables.displacement_result`) by tiers of TIERS
-        (`default_tiers` if None), with their errors (`geomech.studies.estimates.estimate`).
+        """Return the net poses (`geomech.studies.tables.displacement_result`) by tiers
+        of TIERS (`default_tiers` if None), with their errors
+        (`geomech.studies.estimates.estimate`).
 
         seconds, by part: time to build each table ("field", "harmonic table" ...), even
         if it was built before, and time of each tier from there, of the direct one with

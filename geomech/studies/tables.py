@@ -103,11 +103,13 @@ def displacement_result(
     """Return the net poses (B, 3) of a gait by tier as a result; lengths are in the
     system's unit.
 
-    errors: (B, 2) by tier, body lengths and rad, of `geomech.studies.estimates.estimate`. medium:
-    spread of the true displacement by an uncertain medium, which every tier shares
-    (`geomech.studies.estimates.uncertainty.medium_spread`), or None. choices: (B, 2), the
-    system's unit and rad, of tiers whose answer depends on the surface that a loop of
-    three and more joints spans. more: further variables. facts: further attributes."""
+    errors: (B, 2) by tier, body lengths and rad, of
+    `geomech.studies.estimates.estimate`. medium: spread of the true displacement by an
+    uncertain medium, which every tier shares
+    (`geomech.studies.estimates.uncertainty.medium_spread`), or None. choices: (B, 2),
+    the system's unit and rad, of tiers whose answer depends on the surface that a loop
+    of three and more joints spans. more: further variables. facts: further
+    attributes."""
     system, tiers = scene.system, tuple(poses)
     unit = length_unit(system)
     length = body_size(system)

@@ -118,8 +118,8 @@ class Cache(_Cache):
             action = f"it cannot be renamed ({error.strerror}): remove it"
         else:
             action = (
-                f"renamed {other.name}; it is compiled anew, python -m rft does that at "
-                "once"
+                f"renamed {other.name}; it is compiled anew, python -m rft does that "
+                "at once"
             )
         note(f"the compiled code in {self.path} is not taken, {why}: {action}")
 

@@ -117,8 +117,8 @@ class Links:
         """Return the pose h of another frame of this body in the body frame, and dh/dt:
         each (..., 3), in length units and rad.
 
-        alpha, alphadot: (..., joints). `geomech.mathematics.geometry.coordinates` uses it to change
-        the frame of velocities and connections.
+        alpha, alphadot: (..., joints). `geomech.mathematics.geometry.coordinates` uses
+        it to change the frame of velocities and connections.
         """
         alpha, alphadot = np.broadcast_arrays(
             unmasked("alpha", alpha), unmasked("alphadot", alphadot)

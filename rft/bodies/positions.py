@@ -167,7 +167,9 @@ class Positions(PosedLinks):
     >>> from rft.bodies import Positions
     >>> def poses(alpha):  # of two links that meet at the origin
     ...     heading = np.stack([-alpha[..., 0] / 2, alpha[..., 0] / 2], -1)
-    ...     return np.stack([[-0.25, 0.25] * np.cos(heading), [-0.25, 0.25] * np.sin(heading), heading], -1)
+    ...     x = [-0.25, 0.25] * np.cos(heading)
+    ...     y = [-0.25, 0.25] * np.sin(heading)
+    ...     return np.stack([x, y, heading], -1)
     ...
     >>> body = Positions(poses, joints=1, lengths=(0.5, 0.5))
     >>> xi = body_velocity(Viscous(), body, [0.5], [1.0]).xi

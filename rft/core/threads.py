@@ -89,7 +89,8 @@ def run_shares(function: Callable, shares: list) -> None:
                 raise error
     except BaseException:
         stop.set()
-        # Not counted by results: a signal may arrive between a `get` and its assignment.
+        # Not counted by results: a signal may arrive between a `get` and its
+        # assignment.
         while len(ended) < started:
             time.sleep(POLL_INTERVAL)
         raise

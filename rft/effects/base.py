@@ -20,8 +20,8 @@ from rft.effects.contact import Problem
 # Engines and what they solve, the cheapest first.
 ENGINES = {
     "algebraic": "the balance of forces at every shape, all shapes at once",
-    "time stepping": "the balance of forces step after step through the gait, place and "
-    "past carried along",
+    "time stepping": "the balance of forces step after step through the gait, place "
+    "and past carried along",
     "dynamic": "the equation of motion phase after phase, implicit in time",
 }
 PAST = Premise.MEMORYLESS | Premise.QUASI_STATIC

@@ -100,8 +100,8 @@ class Slope(Effect):
         require(
             pull < drag,
             "a body of this weight slides down",
-            because=f"its pull along the slope, {pull:.3g} of the drag on level ground, "
-            f"must be below the drag downhill, {drag:.3g}",
+            because=f"its pull along the slope, {pull:.3g} of the drag on level "
+            f"ground, must be below the drag downhill, {drag:.3g}",
         )
 
     def check(self, medium: Any) -> None:

@@ -14,7 +14,9 @@ at the ends and S = R1 + R2 give the elliptic coordinates mu = 2 v_n / S, t = 2 
 in which A^2 = S^2 (1 - mu^2) (1 - t^2) / 4, and every average is elementary in mu, t
 and k(t) = (atanh t - t) / t^3:
 
-    <1/R> = (2 / S) (1 + t^2 k)    <u/R> = mu    <s u/R> = (1 - mu^2) t h / 2,    h = 1 - (1 - t^2) k.
+    <1/R> = (2 / S) (1 + t^2 k)    <u/R> = mu    <s u/R> = (1 - mu^2) t h / 2
+
+with h = 1 - (1 - t^2) k.
 
 All functions here are formulas (`rft.formulas.vectors`): they take numbers, arrays that
 broadcast, and the vectors of compiled code."""
@@ -171,9 +173,11 @@ def dry(v_t, v_n, v_w, rounding, q, k_t, k_n):
     normal = k_n * two_over_S * one_minus_mu2 * p
     cross = -normal * mu * t
     return Load(
-        k_t * v_t * mean_1_R, k_t * (mean_1_R - v_t * q2v * mean_1_R3), -k_t * v_t * mean_u_R3, -k_t * v_t * mean_su_R3,
+        k_t * v_t * mean_1_R, k_t * (mean_1_R - v_t * q2v * mean_1_R3),
+        -k_t * v_t * mean_u_R3, -k_t * v_t * mean_su_R3,
         k_n * mu, -k_n * q2v * mean_u_R3, normal, cross,
-        0.5 * k_n * one_minus_mu2 * t * h, -k_n * q2v * mean_su_R3, cross, k_n * two_over_S * one_minus_mu2 * (p - h),
+        0.5 * k_n * one_minus_mu2 * t * h, -k_n * q2v * mean_su_R3, cross,
+        k_n * two_over_S * one_minus_mu2 * (p - h),
     )  # fmt: skip
 
 
@@ -195,7 +199,8 @@ def dry_point(v_t, v_n, rounding, terms):
         e_n, e_t, e = v_n * inverse, v_t * inverse, rounding * inverse
         mixed = e_n * e_t * inverse
         load = sum_loads(load, Load(
-            k_n * e_t, k_n * (q * e_n * (q * e_n) + e * e) * inverse, -k_n * q * q * mixed, zero,
+            k_n * e_t, k_n * (q * e_n * (q * e_n) + e * e) * inverse,
+            -k_n * q * q * mixed, zero,
             k_t * e_n, -k_t * mixed, k_t * (e_t * e_t + e * e) * inverse, zero,
             zero, zero, zero, zero,
         ))  # fmt: skip
@@ -243,8 +248,10 @@ def quadratic_load(v_n, v_w, strength):
     zero, cross = 0.0 * v_n, 2.0 * (v_n * s1 + v_w * s2)
     return Load(
         zero, zero, zero, zero,
-        v_n * v_n * s0 + 2.0 * v_n * v_w * s1 + v_w * v_w * s2, zero, 2.0 * (v_n * s0 + v_w * s1), cross,
-        v_n * v_n * s1 + 2.0 * v_n * v_w * s2 + v_w * v_w * s3, zero, cross, 2.0 * (v_n * s2 + v_w * s3),
+        v_n * v_n * s0 + 2.0 * v_n * v_w * s1 + v_w * v_w * s2, zero,
+        2.0 * (v_n * s0 + v_w * s1), cross,
+        v_n * v_n * s1 + 2.0 * v_n * v_w * s2 + v_w * v_w * s3, zero, cross,
+        2.0 * (v_n * s2 + v_w * s3),
     )  # fmt: skip
 
 
@@ -302,11 +309,14 @@ def inclined_load(load, v, rounding, incline):
     slope_t = loss * (cosine * v[0] - down_t)
     slope_n = loss * (cosine * v[1] - down_n)
     return Load(
-        factor * load.t - weight * down_t, factor * load.t_t + slope_t * load.t, factor * load.t_n + slope_n * load.t,
+        factor * load.t - weight * down_t, factor * load.t_t + slope_t * load.t,
+        factor * load.t_n + slope_n * load.t,
         factor * load.t_w,
-        factor * load.n - weight * down_n, factor * load.n_t + slope_t * load.n, factor * load.n_n + slope_n * load.n,
+        factor * load.n - weight * down_n, factor * load.n_t + slope_t * load.n,
+        factor * load.n_n + slope_n * load.n,
         factor * load.n_w,
-        factor * load.w, factor * load.w_t + slope_t * load.w, factor * load.w_n + slope_n * load.w, factor * load.w_w,
+        factor * load.w, factor * load.w_t + slope_t * load.w,
+        factor * load.w_n + slope_n * load.w, factor * load.w_w,
     )  # fmt: skip
 
 
@@ -398,7 +408,8 @@ def with_share_along(load, v_t, memory):
         direction, before, absolute(v_t), memory.at_once_along, memory.step_along
     )
     return Load(
-        value * load.t, value * load.t_t + sign * slope * load.t, value * load.t_n, value * load.t_w,
+        value * load.t, value * load.t_t + sign * slope * load.t, value * load.t_n,
+        value * load.t_w,
         load.n, load.n_t, load.n_n, load.n_w, load.w, load.w_t, load.w_n, load.w_w,
     )  # fmt: skip
 
@@ -428,7 +439,8 @@ def part_load(law, v_t, v_n, v_w, rounding, low, high, share):
         h * f.t, h * f.t_t, h * f.t_n, h * (c * f.t_n + h * f.t_w),
         h * value * f.n, h * value * f.n_t, h * (value * f.n_n + by_n * f.n),
         h * (value * (c * f.n_n + h * f.n_w) + by_w * f.n),
-        h * value * w, h * value * w_t, h * (value * w_n + by_n * w), h * (value * (c * w_n + h * w_w) + by_w * w),
+        h * value * w, h * value * w_t, h * (value * w_n + by_n * w),
+        h * (value * (c * w_n + h * w_w) + by_w * w),
     )  # fmt: skip
 
 

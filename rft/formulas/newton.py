@@ -359,5 +359,6 @@ def first_iterate(dx, dy, dtheta, first, fresh):
     return Iterate(
         zero, zero, zero,
         dx, dy, dtheta,
-        zero + first, zero + where(fresh > 0.0, VISCOUS, first), zero + 1.0, zero + np.inf, zero, zero, zero + fresh,
+        zero + first, zero + where(fresh > 0.0, VISCOUS, first), zero + 1.0,
+        zero + np.inf, zero, zero, zero + fresh,
     )  # fmt: skip

@@ -121,6 +121,7 @@ FUNCTIONS = (
     gather,
 )
 ALLOWED = (
-    "a formula takes + - * /, < <= > >= == joined by & and |, numbers of the law, other "
-    f"formulas, and of rft.formulas.vectors {', '.join(f.__name__ for f in FUNCTIONS)}"
+    "a formula takes + - * /, < <= > >= == joined by & and |, numbers of the law, "
+    "other formulas, and of rft.formulas.vectors "
+    + ", ".join(function.__name__ for function in FUNCTIONS)
 )

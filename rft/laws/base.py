@@ -52,7 +52,8 @@ class Medium(Protocol):
     ...     def traction(self, v_t, v_n, eps=0.0):
     ...         return v_t, self.ratio * v_n
     ...
-    >>> body_velocity(Drag(), Chain(), [0.5, 0.3], [1.0, 0.0]).xi.round(4)  # as by Viscous(2)
+    >>> # The same as by Viscous(2):
+    >>> body_velocity(Drag(), Chain(), [0.5, 0.3], [1.0, 0.0]).xi.round(4)
     array([-0.0014, -0.0035, -0.0817])
     """
 

@@ -52,8 +52,8 @@ SURFACE_ALONG_RANGE = (0.010, 0.017)  # assumed
 
 ZHANG_GOLDMAN = "Zhang and Goldman, Phys. Fluids 26, 101308 (2014)"
 FITTED = (
-    "f_n = C_S sin(atan(cot g0 sin psi)) + C_F sin psi, f_t = C_F cos psi fitted to rod "
-    "drag at 7.62 cm depth, as written in third-party code; "
+    "f_n = C_S sin(atan(cot g0 sin psi)) + C_F sin psi, f_t = C_F cos psi fitted to "
+    "rod drag at 7.62 cm depth, as written in third-party code; "
 )
 
 CATALOGUE = {
@@ -91,9 +91,9 @@ CATALOGUE = {
             gamma0=math.atan(math.sqrt(0.00389)),
             across=SURFACE_ACROSS / SURFACE_ALONG,
         ),
-        "Schiebel et al., eLife 9, e51412 (2020): plate 8 mm deep at the surface of 0.3 "
-        "mm glass; drag across 0.15 N, C = 0.198, tan^2 g0 = 0.00389; drag along of the "
-        "form 0.017 N cos psi is assumed (0.010 to 0.017 N)",
+        "Schiebel et al., eLife 9, e51412 (2020): plate 8 mm deep at the surface of "
+        "0.3 mm glass; drag across 0.15 N, C = 0.198, tan^2 g0 = 0.00389; drag along "
+        "of the form 0.017 N cos psi is assumed (0.010 to 0.017 N)",
     ),
     "viscous-2": Entry(
         Viscous(2.0),

@@ -28,7 +28,9 @@ class Rod:
     --------
     >>> from rft.fits.rods import fit
     >>> from rft.laws.drag import Rod, rod_drag
-    >>> drag = rod_drag([0, 30, 60, 90], [1.0, 0.9, 0.5, 0.0], [0.0, 1.0, 1.7, 2.0])  # degrees, N
+    >>> along = [1.0, 0.9, 0.5, 0.0]  # N
+    >>> across = [0.0, 1.0, 1.7, 2.0]
+    >>> drag = rod_drag([0, 30, 60, 90], along, across)  # at angles in degrees
     >>> round(fit("viscous", drag, Rod(radius=0.008, length=0.08)).axial_stress)  # Pa
     793
     """

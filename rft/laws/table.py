@@ -53,7 +53,8 @@ class Table:
     --------
     >>> import math
     >>> from rft.laws import Table
-    >>> medium = Table(psi=(0.0, math.pi / 4, math.pi / 2), f_t=(1.0, 0.8, 0.0), f_n=(0.0, 1.9, 2.5))
+    >>> angles = (0.0, math.pi / 4, math.pi / 2)
+    >>> medium = Table(psi=angles, f_t=(1.0, 0.8, 0.0), f_n=(0.0, 1.9, 2.5))
     >>> round(float(medium.traction(0.0, 1.0)[1]), 2)
     2.5
     """

@@ -102,7 +102,8 @@ class BedGeoms:
 
     def poses(self, data) -> tuple[np.ndarray, np.ndarray]:
         """Return rotations from the geoms' axes to the world, (G, 3, 3), and places of
-        their origins, (G, 3), m. data: MjData or `rft.mujoco.memory.addresses.Arrays`."""
+        their origins, (G, 3), m. data: MjData or
+        `rft.mujoco.memory.addresses.Arrays`."""
         return data.geom_xmat[self.ids].reshape(-1, 3, 3), data.geom_xpos[self.ids]
 
 
@@ -162,7 +163,8 @@ class Bed:
         return self.prints.userdata_size if self.prints else 0
 
     def frames(self, data) -> Frames:
-        """Return where the geoms are. data: MjData or `rft.mujoco.memory.addresses.Arrays`."""
+        """Return where the geoms are. data: MjData or
+        `rft.mujoco.memory.addresses.Arrays`."""
         turn, place = self.geoms.poses(data)
         middles = place + np.einsum("gij,gj->gi", turn, self.geoms.spheres[:, :3])
         up, level = self.surface.planes(middles)

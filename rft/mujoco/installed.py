@@ -86,8 +86,8 @@ class Effort(NamedTuple):
 class Observation(NamedTuple):
     """What the grains do in one step.
 
-    residual, status, rounding: as of `rft.mujoco.step.implicit.Result`. wrenches, twists:
-    (G, 6), along the geoms' axes, at the end of the step."""
+    residual, status, rounding: as of `rft.mujoco.step.implicit.Result`. wrenches,
+    twists: (G, 6), along the geoms' axes, at the end of the step."""
 
     residual: float
     status: int

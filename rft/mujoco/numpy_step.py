@@ -32,8 +32,8 @@ POINTER = ctypes.c_void_p
 def add_forces(bed: Bed, parts: ModelParts, data: int):
     """Add the forces of the grains to qfrc_passive of the mjData at an address.
 
-    Returns (result, geom, wrenches, twists) of `rft.mujoco.step.equations.solve_blocks`;
-    None where no geom is in the ground."""
+    Returns (result, geom, wrenches, twists) of
+    `rft.mujoco.step.equations.solve_blocks`; None where no geom is in the ground."""
     arrays = Arrays(data, parts.sizes)
     frames = bed.frames(arrays)
     velocity = arrays.qvel

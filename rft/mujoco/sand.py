@@ -325,8 +325,8 @@ def attach(
         by `Sand.batch`.
     medium : str, StressMap or Spatial
         Name in `rft.terradynamics.plates.VERTICAL` or a stress map of the vertical
-        plane, extended to three dimensions by `rft.terradynamics.meshes.forces.extruded`; or a
-        law of three dimensions.
+        plane, extended to three dimensions by
+        `rft.terradynamics.meshes.forces.extruded`; or a law of three dimensions.
     geoms : str, int or list of these
         Names of the geoms in the sand or of their bodies, patterns such as "leg*" and
         groups; by default all that move. Geoms that can touch nothing are left out,
@@ -568,8 +568,8 @@ def _size_note(model: mujoco.MjModel, bed: Bed) -> str:
     largest = int(np.argmax(counts))
     return (
         f"the sand has {counts.sum():,} elements, {counts[largest]:,} of them on the"
-        f" geom {geom_label(model, bed.geoms.ids[largest])}: steps take long; give fewer"
-        " geoms, or a longer element"
+        f" geom {geom_label(model, bed.geoms.ids[largest])}: steps take long; give "
+        "fewer geoms, or a longer element"
     )
 
 

@@ -26,8 +26,8 @@ TICKS = np.array([-1.0, 0.0, 1.0])
 
 
 def write_struct(path: str | Path, result: Result) -> None:
-    """Write s from the variables of `geomech.studies.maps.fields.struct_result`; the file
-    appears whole or not at all."""
+    """Write s from the variables of `geomech.studies.maps.fields.struct_result`; the
+    file appears whole or not at all."""
     from scipy.io import savemat
 
     axes = []

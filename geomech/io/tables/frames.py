@@ -2,9 +2,9 @@
 minimum-perturbation coordinates.
 
 In the frame whose pose in the first is h(alpha), xi_2 = Ad_h^-1 xi_1 + h^-1 dh/dt
-(`geomech.mathematics.geometry.coordinates`). A and harmonics are exact at the grid's points. Of an
-rms residual, and of half widths of intervals, only the size of each component is known:
-they are multiplied by |Ad_h^-1|, which gives an upper bound.
+(`geomech.mathematics.geometry.coordinates`). A and harmonics are exact at the grid's
+points. Of an rms residual, and of half widths of intervals, only the size of each
+component is known: they are multiplied by |Ad_h^-1|, which gives an upper bound.
 """
 
 from __future__ import annotations

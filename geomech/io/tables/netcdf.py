@@ -373,8 +373,8 @@ def _even_part(contents: _Contents) -> np.ndarray:
 
 
 def _taylor_series(contents: _Contents, factor: float) -> TaylorSeries:
-    """Return the Taylor series about a gait (`geomech.mathematics.geometry.representations.tube`), with A times
-    ``factor``."""
+    """Return the Taylor series about a gait
+    (`geomech.mathematics.geometry.representations.tube`), with A times ``factor``."""
     for name, count in TAYLOR_VARIABLES.items():
         if name not in contents or contents.variables[name][1].ndim != count:
             raise Refusal(f"has a gait, but no {name} that fits it", instead=FITTED)

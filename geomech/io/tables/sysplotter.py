@@ -213,8 +213,8 @@ def _matlab_index(index: Iterable[int]) -> str:
 
 
 def _checked_numbers(place: str, values: Any) -> np.ndarray:
-    """Return `checked_numbers`; a Refusal of one that is not finite has its place as MATLAB
-    counts."""
+    """Return `checked_numbers`; a Refusal of one that is not finite has its place as
+    MATLAB counts."""
     kind = getattr(values, "dtype", np.dtype(object)).kind
     if kind == "f" and not np.isfinite(values).all():
         index = _matlab_index(np.argwhere(~np.isfinite(values))[0])

@@ -241,7 +241,12 @@ def sampled(
 
     Examples
     --------
-    >>> from geomech.mathematics.geometry.connection import directions, grid, least_squares, sampled
+    >>> from geomech.mathematics.geometry.connection import (
+    ...     directions,
+    ...     grid,
+    ...     least_squares,
+    ...     sampled,
+    ... )
     >>> from geomech.scenes import load
     >>> velocity = load("three-link-viscous").system.velocity
     >>> unit = directions(2, 8)
@@ -277,7 +282,11 @@ def sampled_on(
     Examples
     --------
     >>> import numpy as np
-    >>> from geomech.mathematics.geometry.connection import directions, least_squares, sampled_on
+    >>> from geomech.mathematics.geometry.connection import (
+    ...     directions,
+    ...     least_squares,
+    ...     sampled_on,
+    ... )
     >>> from geomech.scenes import load
     >>> velocity = load("three-link-viscous").system.velocity
     >>> unit, alpha = directions(2, 8), np.zeros((3, 4, 2))
@@ -315,7 +324,11 @@ def sampled_at(
     Examples
     --------
     >>> import numpy as np
-    >>> from geomech.mathematics.geometry.connection import directions, least_squares, sampled_at
+    >>> from geomech.mathematics.geometry.connection import (
+    ...     directions,
+    ...     least_squares,
+    ...     sampled_at,
+    ... )
     >>> from geomech.scenes import load
     >>> unit = directions(2, 8)
     >>> velocity = load("three-link-viscous").system.velocity
@@ -450,8 +463,9 @@ def fit(
     progress: called with the fraction done. traits: facts about the velocity. Where
     left and right are alike (``halved``) half of a symmetric grid gives the other half;
     ``reversible`` halves it again where the directions allow
-    (`geomech.mathematics.geometry.representations.images`); where ``singularity`` passes through 0 the connection
-    is nan. Errors that ``velocity`` raises are passed on.
+    (`geomech.mathematics.geometry.representations.images`); where ``singularity``
+    passes through 0 the connection is nan. Errors that ``velocity`` raises are passed
+    on.
 
     A velocity that takes one shape at a time is called for each in turn, and its result
     is broadcast. It is tried at a few shapes: `VelocityWarning` if it is not odd or not

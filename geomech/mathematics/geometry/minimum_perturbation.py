@@ -46,8 +46,8 @@ class Frame:
 
     def __call__(self, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
         """Return h and dh/dt, (..., 3) each, for alpha, alphadot (..., d), as
-        `geomech.mathematics.geometry.coordinates.in_frame` takes them; ValueError outside the
-        grid."""
+        `geomech.mathematics.geometry.coordinates.in_frame` takes them; ValueError
+        outside the grid."""
         alphadot = real_array("alphadot", alphadot)
         rate = np.einsum("...ij,...j->...i", self.slopes(alpha), alphadot)
         return np.broadcast_arrays(self.pose(alpha), rate)

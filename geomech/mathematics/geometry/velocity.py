@@ -27,8 +27,8 @@ SAME = 1e-12  # of the velocity's rms: a smaller change with the shape is none
 def checked_velocity(
     velocity: Callable, axes: Sequence[ArrayLike], masked: bool
 ) -> Callable:
-    """Return the velocity, as `geomech.mathematics.geometry.connection.evaluate` takes it; a
-    velocity of a single shape is called for one shape at a time.
+    """Return the velocity, as `geomech.mathematics.geometry.connection.evaluate` takes
+    it; a velocity of a single shape is called for one shape at a time.
 
     `VelocityWarning`, once for all reasons, if it is not odd or not homogeneous in
     alphadot, or ignores alpha."""

@@ -46,7 +46,8 @@ def ccf(A: sp.Matrix, alpha: Sequence[sp.Symbol], i: int = 0, j: int = 1) -> sp.
 
 def velocity(A: sp.Matrix, alpha: Sequence[sp.Symbol]) -> Callable[..., Any]:
     """Return a function velocity(alpha, alphadot) -> xi, as
-    `geomech.mathematics.geometry.connection.fit` and `geomech.mathematics.tiers.direct.direct` take it.
+    `geomech.mathematics.geometry.connection.fit` and
+    `geomech.mathematics.tiers.direct.direct` take it.
 
     Examples
     --------

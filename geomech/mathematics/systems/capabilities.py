@@ -64,8 +64,8 @@ class Refinable(Protocol):
 
 @runtime_checkable
 class Dissipative(Protocol):
-    """A body that does work against its medium; read by `geomech.studies.estimates.effort` and
-    `geomech.studies.optimisation`."""
+    """A body that does work against its medium; read by
+    `geomech.studies.estimates.effort` and `geomech.studies.optimisation`."""
 
     def power(self, alpha, alphadot, xi) -> np.ndarray:
         """Return the rate of work (...) at shapes, rates (..., d) and the velocity
@@ -84,8 +84,8 @@ class OwnMetric(Protocol):
 
 @runtime_checkable
 class Loaded(Protocol):
-    """A body under forces along its length; read by `geomech.studies.mechanics.forces` and
-    `undulation`.
+    """A body under forces along its length; read by `geomech.studies.mechanics.forces`
+    and `undulation`.
 
     axial_drag: on the whole straight body along itself, in the law's unit of force."""
 
@@ -144,8 +144,8 @@ class Uncertain(Protocol):
 
 @runtime_checkable
 class Stepped(Protocol):
-    """Cycles that differ from one another; read by `geomech.studies.mechanics.motion` and
-    `choose`.
+    """Cycles that differ from one another; read by `geomech.studies.mechanics.motion`
+    and `choose`.
 
     settling: change of displacement at which cycles count as repeating, body lengths or
     rad; 0 if they are not run until they do."""
@@ -176,7 +176,8 @@ class BalanceSize(NamedTuple):
 
 @runtime_checkable
 class Costed(System, Protocol):
-    """A velocity that takes a balance of forces; read by `geomech.studies.estimates.cost`."""
+    """A velocity that takes a balance of forces; read by
+    `geomech.studies.estimates.cost`."""
 
     balance_size: BalanceSize
 
@@ -203,7 +204,8 @@ class Part(NamedTuple):
 
 @runtime_checkable
 class Composite(Protocol):
-    """A system whose parts break premises; read by `geomech.mathematics.systems.premises`."""
+    """A system whose parts break premises; read by
+    `geomech.mathematics.systems.premises`."""
 
     parts: tuple[Part, ...]
 

@@ -78,7 +78,8 @@ class Momentum:
         """Return masses of the links, and [along, across, about the centre] of each:
         its inertia with the fluid's, in any single unit and body lengths.
 
-        number: `float`, or `geomech.mathematics.symbolic.connections.exact` for formulas."""
+        number: `float`, or `geomech.mathematics.symbolic.connections.exact` for
+        formulas."""
         raise NotImplementedError
 
     @property

@@ -16,9 +16,10 @@ from rft.formulas.quadrature import parse
 class Solver:
     """How the balance of forces is solved; part of [numerics].
 
-    loads (-): "exact", "midpoint:N", "gauss:N" (rft.formulas.quadrature). backend (-): "numpy",
-    "numba" (compiled code, where numba is installed) or "auto": compiled code where
-    numba is installed (`rft.balance.backend`). Answers are the same but for rounding.
+    loads (-): "exact", "midpoint:N", "gauss:N" (rft.formulas.quadrature). backend (-):
+    "numpy", "numba" (compiled code, where numba is installed) or "auto": compiled code
+    where numba is installed (`rft.balance.backend`). Answers are the same but for
+    rounding.
 
     Examples
     --------

@@ -2,9 +2,10 @@
 program or an experiment.
 
 Where the file has the odd harmonics of the velocity beside A
-(`geomech.mathematics.geometry.representations.harmonics`), xi depends on the direction of alphadot as in the scene
-it came from, and A is its linear part; else xi = A alphadot. Abilities that depend on
-the file are classes below `Table`; `Table.capability` returns them."""
+(`geomech.mathematics.geometry.representations.harmonics`), xi depends on the direction
+of alphadot as in the scene it came from, and A is its linear part; else xi = A
+alphadot. Abilities that depend on the file are classes below `Table`;
+`Table.capability` returns them."""
 
 from __future__ import annotations
 
@@ -74,8 +75,8 @@ class Table:
     one. sign (-): "+" or "-" for xi = + or - A alphadot in the file; order (-):
     "ndgrid" or "meshgrid"; if left out as the file says or shows (`tables.load`).
     sha256 (-): of the file, filled in if left out; given, the file must have it.
-    frame (-): of xi, "mean", "link-1" ... or "minimum-perturbation", the file's own if left
-    out; another frame takes a body, from the file or the scene.
+    frame (-): of xi, "mean", "link-1" ... or "minimum-perturbation", the file's own if
+    left out; another frame takes a body, from the file or the scene.
 
     body: the chain of the table, in the frame of its A, where the file does not say it.
     medium: its law on that body gives the power of a change of shape, in place of a

@@ -173,7 +173,8 @@ def plane(
     progress: Callable | None = None,
 ) -> Plane:
     """Return the plane of shape space on which two joints move
-    (`geomech.mathematics.geometry.representations.plane`), interpolated in a stored field.
+    (`geomech.mathematics.geometry.representations.plane`), interpolated in a stored
+    field.
 
     Refusal for a system without a connection, or a plane outside the field."""
     refuse(system)

@@ -53,8 +53,9 @@ class Subject:
     """What a question is about, as its command's first argument: mostly a scene.
 
     load: returns it from its text and from the values of ``changes``, options of the
-    command that change it (`geomech.shell.command.CHANGES`). names: returns those that a
-    shell completes. default: what is taken where nothing is given; "" if it must be."""
+    command that change it (`geomech.shell.command.CHANGES`). names: returns those that
+    a shell completes. default: what is taken where nothing is given; "" if it must
+    be."""
 
     load: Callable[..., Any]
     names: Callable[[], list[str]] | None = None
@@ -111,11 +112,11 @@ class Question(Plain):
     `headline`, `summary`, `remarks`, `draw`, `files`.
 
     cheaper_alternative: advice where it costs too much. report_above: seconds of
-    computing from which on
-    a command prints the cost. parallel: whether other processes can take a part. folder:
-    whether its command fills a folder by its function `fill`, whose keywords are options
-    of the command; default_folder: its name where none is given. unlimited: whether it is
-    computed whatever it costs. consent_beyond: what its command asks consent for."""
+    computing from which on a command prints the cost. parallel: whether other processes
+    can take a part. folder: whether its command fills a folder by its function `fill`,
+    whose keywords are options of the command; default_folder: its name where none is
+    given. unlimited: whether it is computed whatever it costs. consent_beyond: what its
+    command asks consent for."""
 
     name: ClassVar[str]
     cheaper_alternative: ClassVar[str] = "ask for less"

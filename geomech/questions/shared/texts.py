@@ -293,8 +293,8 @@ def is_limit(text: str, in_percent: bool) -> bool:
 
 
 def measurements(path: Path | None, scene: Any, panels: Sequence[str]) -> Any:
-    """Return what `geomech.scenes.data.measurements` reads of the quantity of one panel, x
-    if none is named; None without a file."""
+    """Return what `geomech.scenes.data.measurements` reads of the quantity of one
+    panel, x if none is named; None without a file."""
     from geomech.scenes.data.measurements import read
 
     if path is None:

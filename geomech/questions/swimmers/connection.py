@@ -86,7 +86,8 @@ class Connection(Question):
     pair: Pair = None
     slice: Slice = None
     compare_frame: OtherFrame = None
-    # Contents of files, of `geomech.studies.maps.fields.CONTENTS`, and whether it is drawn.
+    # Contents of files, of `geomech.studies.maps.fields.CONTENTS`, and whether it is
+    # drawn.
     contents: tuple[str, ...] = field(default=(), kw_only=True)
     drawn: bool = field(default=False, kw_only=True)
 

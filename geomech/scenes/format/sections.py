@@ -13,10 +13,10 @@ A scene is a dataclass whose fields declare their sections in annotations:
 
 `reader`, `write`, `keys` and `schema` follow these declarations. The keys of a section
 are the fields of a class, where their units, bounds and meanings stand
-(`geomech.scenes.format.key`). The class is that of the part, or only has its keys. In the
-second case it has a method ``to_part(source, place, given)`` that returns the part, or
-a dict of several fields of the scene (given: the fields in the file), and an attribute
-``makes``, the class of parts that it can write.
+(`geomech.scenes.format.key`). The class is that of the part, or only has its keys. In
+the second case it has a method ``to_part(source, place, given)`` that returns the part,
+or a dict of several fields of the scene (given: the fields in the file), and an
+attribute ``makes``, the class of parts that it can write.
 """
 
 from __future__ import annotations

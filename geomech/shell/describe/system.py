@@ -78,8 +78,8 @@ def notes(system: System) -> tuple[str, ...]:
     return (
         f"the law {name_in(LAWS, system.medium)} has no closed form: its averages over "
         f"an element are by quadrature ({QUADRATURE}) in place of exact integrals, "
-        "which takes some five times as long and, where drag is dry, is off by 1 to 7 % "
-        "of the displacement of three links, less of more; errors include it, and "
+        "which takes some five times as long and, where drag is dry, is off by 1 to 7 "
+        "% of the displacement of three links, less of more; errors include it, and "
         '[numerics] loads = "gauss:96" lowers it tenfold',
     )
 

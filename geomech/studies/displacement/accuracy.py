@@ -66,8 +66,8 @@ class AccuracySubject(Protocol):
 
 
 def accuracy_subject(scene: Any, runs: int | None = None) -> AccuracySubject:
-    """Return the subject of an accuracy study of a scene: a displacement, forces along a
-    motion, or the speed of a robot."""
+    """Return the subject of an accuracy study of a scene: a displacement, forces along
+    a motion, or the speed of a robot."""
     module = "displacement.tiered"
     for part, name in KINDS.items():
         if hasattr(scene, part):

@@ -51,7 +51,8 @@ N_PILOT = 9  # amplitudes at which look-up tiers are tried first
 class _Request:
     """Displacements (B, 3) that are wanted within ``tol`` body lengths.
 
-    allow: called with the jobs (`geomech.studies.estimates.cost`) that are about to run."""
+    allow: called with the jobs (`geomech.studies.estimates.cost`) that are about to
+    run."""
 
     study: SceneTables
     gait: Gait
@@ -102,8 +103,8 @@ def cheapest_displacements(
     tried from the cheapest on, as long as they cost less than the direct tier. For the
     direct tier the fewest phases are found; its seconds include the search.
 
-    allow: called with the jobs (`geomech.studies.estimates.cost`) that are about to run. Refusal
-    if no tier is accurate enough."""
+    allow: called with the jobs (`geomech.studies.estimates.cost`) that are about to
+    run. Refusal if no tier is accurate enough."""
     if not (is_number(tol) and 0 < tol <= 1e300):
         raise Refusal("``tolerance`` must be a number > 0 in body lengths", value=tol)
 

@@ -1,8 +1,8 @@
 """Cost of studies: the force balances and the memory of each part of a request, as a
 list of jobs, counted before anything is computed.
 
-Balances are counted as tiers and error estimates (`geomech.studies.estimates.estimate`) need
-them.
+Balances are counted as tiers and error estimates (`geomech.studies.estimates.estimate`)
+need them.
 Where time stepping runs until cycles repeat, the number of cycles is assumed. Seconds
 are those of `geomech.run.cost`. From Python nothing is refused: see
 `SceneTables.cost`."""

@@ -4,9 +4,9 @@ cost of transport of its gaits.
 Power is in axial drags of the whole body times body lengths per unit of time, in which
 the phase grows by 1 rad; in a fluid the drag is that at a body length per unit of time.
 Work is the integral of power over a cycle, in drag x BL. Path length is the integral of
-F = power^(1/degree) (`geomech.mathematics.geometry.metric`), in body lengths: F is the speed at
-which towing the body, straight and along itself, takes the same power. In a dry medium
-path length and work are the same number.
+F = power^(1/degree) (`geomech.mathematics.geometry.metric`), in body lengths: F is the
+speed at which towing the body, straight and along itself, takes the same power. In a
+dry medium path length and work are the same number.
 
 Efficiency is the net distance in body lengths over path length. Cost of transport is
 the work over that of towing the body as far in the same time. A system with its own
@@ -249,9 +249,9 @@ def effort(
     Each error is a sum: the change with half of the phases, in time stepping at least a
     quarter of the change from half to a quarter of them; twice the change with twice
     the pieces into which effects cut the body; and what half and a quarter of the
-    elements of a continuous body show (`geomech.studies.estimates.elements`). Changes by later
-    cycles are not included. Path lengths are nan where power has no one degree in the
-    rate. Refusal where the cost of moving is unknown."""
+    elements of a continuous body show (`geomech.studies.estimates.elements`). Changes
+    by later cycles are not included. Path lengths are nan where power has no one degree
+    in the rate. Refusal where the cost of moving is unknown."""
     system = scene.system
     gait = checked_gait(scene.gait if gait is None else gait)
     if amplitudes is None:

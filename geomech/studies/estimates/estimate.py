@@ -3,10 +3,11 @@
 Every estimate is a refinement, never a constant: the direct tier against itself at
 half, a quarter and an eighth of the phases and, on the quarter, with the regularisation
 ten times smaller and exact link integrals, with pieces of half the length, or with half
-and a quarter of the elements of a continuous body (`geomech.studies.estimates.elements`); a table
-against half of its grid, and by the residual of its fit (`System.table_error`); every
-other tier against the direct tier. Errors come in pairs: the distance between net
-positions, in body lengths, and between net headings, in rad."""
+and a quarter of the elements of a continuous body
+(`geomech.studies.estimates.elements`); a table against half of its grid, and by the
+residual of its fit (`System.table_error`); every other tier against the direct tier.
+Errors come in pairs: the distance between net positions, in body lengths, and between
+net headings, in rad."""
 
 from __future__ import annotations
 

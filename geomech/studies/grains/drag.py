@@ -54,7 +54,8 @@ class GrainSteps(Cost):
         raise TooLong(
             str(self),
             where=place,
-            instead=f"to compute for more than {longest} say ``yes``, or {cheaper_alternative}",
+            instead=f"to compute for more than {longest} say ``yes``, or "
+            f"{cheaper_alternative}",
         )
 
 

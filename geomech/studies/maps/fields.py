@@ -411,8 +411,9 @@ def reach_variable(tube: Tube) -> Variable:
 
 
 def taylor_variables(series: TaylorSeries, unit: str) -> list[Variable]:
-    """Return the arrays of a connection near one gait (`geomech.mathematics.geometry.representations.tube`), from
-    which a file restores it. unit: of lengths."""
+    """Return the arrays of a connection near one gait
+    (`geomech.mathematics.geometry.representations.tube`), from which a file restores
+    it. unit: of lengths."""
     units = f"{unit}/rad (x, y), rad/rad (theta)"
     over = ("component", "joint")
     harmonics = "harmonic_of_A"

@@ -155,11 +155,11 @@ def fit_log(
     """Fit the connection near the mean gait of a log; Refusal for a log that does not
     determine it.
 
-    columns, degrees: as in `geomech.studies.measured.log.read`. level: share of cases in which
-    an interval should contain the truth. harmonics: of the connection in the phase; by
-    cross-validation if None. limits (rad): distance from the mean gait up to which the
-    connection is given; as far as the data extend if None. body_length: in the unit of
-    x and y; None for a log in body lengths.
+    columns, degrees: as in `geomech.studies.measured.log.read`. level: share of cases
+    in which an interval should contain the truth. harmonics: of the connection in the
+    phase; by cross-validation if None. limits (rad): distance from the mean gait up to
+    which the connection is given; as far as the data extend if None. body_length: in
+    the unit of x and y; None for a log in body lengths.
 
     Examples
     --------

@@ -42,7 +42,8 @@ class Residual(NamedTuple):
 
     residual: (3,), rms misfit of xi, over the rms of the joint rates. explained: (3,),
     share of the squares of xi that the fit explains. standard_error: (3, 2, PLACES),
-    errors of A as in `geomech.mathematics.geometry.representations.tube.TaylorSeries`."""
+    errors of A as in
+    `geomech.mathematics.geometry.representations.tube.TaylorSeries`."""
 
     residual: np.ndarray
     explained: np.ndarray

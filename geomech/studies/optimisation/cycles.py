@@ -3,8 +3,9 @@
 Where the velocity follows from shape alone, its derivatives by shape and rate are
 computed at every phase by central differences: one batch of 4 d + 1 velocities,
 whatever the number of harmonics. The chain rule through the reconstruction
-(`geomech.mathematics.geometry.reconstruct.slopes`) and the series is exact. Where a gait can only
-be run cycle by cycle, the differences are between whole cycles, run in one batch."""
+(`geomech.mathematics.geometry.reconstruct.slopes`) and the series is exact. Where a
+gait can only be run cycle by cycle, the differences are between whole cycles, run in
+one batch."""
 
 from __future__ import annotations
 

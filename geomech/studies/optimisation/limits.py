@@ -22,8 +22,8 @@ LimitsArgument = float | Sequence[float] | Sequence[Sequence[float]] | None
 
 
 def checked_limits(scene: Scene, limits: LimitsArgument, phases: int) -> Limits:
-    """Return limits as `geomech.studies.optimisation.loops.Loops` takes them: a largest |alpha|
-    for all joints, or (lowest, highest) for each, rad.
+    """Return limits as `geomech.studies.optimisation.loops.Loops` takes them: a largest
+    |alpha| for all joints, or (lowest, highest) for each, rad.
 
     None stands for the extent of the field, or of the scene's gait where that is
     larger; for the whole field of a stored table. Refusal for limits outside the field

@@ -130,8 +130,8 @@ def _largest_change(finer: np.ndarray, coarse: np.ndarray) -> float:
 @dataclass(frozen=True)
 class Settings:
     """Force and moment along a motion by numbers of parts, as the subject of accuracy
-    studies (`geomech.studies.displacement.accuracy`). Errors are rms over the motion, over the
-    largest value, against the finest of the scene's ladder."""
+    studies (`geomech.studies.displacement.accuracy`). Errors are rms over the motion,
+    over the largest value, against the finest of the scene's ladder."""
 
     scene: Intruding
     runs: int = 3

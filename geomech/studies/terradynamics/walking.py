@@ -82,10 +82,10 @@ class Walked(NamedTuple):
     walk: as computed by rft. estimate: error of its speed, m/s, the sum of four parts:
     the larger of the changes with two other numbers of steps, and the change with twice
     the elements, each times the factor of
-    `rft.terradynamics.walking.engines.Variation`; the distance from the limit cycle; and
-    the effect of unsolved steps. lateral, turning: errors of the lateral speed, m/s,
-    and of the yaw rate, rad/s, by the changes alone. steps, elements: m/s, the parts of
-    the estimate that come from each."""
+    `rft.terradynamics.walking.engines.Variation`; the distance from the limit cycle;
+    and the effect of unsolved steps. lateral, turning: errors of the lateral speed,
+    m/s, and of the yaw rate, rad/s, by the changes alone. steps, elements: m/s, the
+    parts of the estimate that come from each."""
 
     walk: Walk
     estimate: float
@@ -400,8 +400,8 @@ class Walks:
 @dataclass(frozen=True)
 class Settings:
     """The speed of a robot, m/s, near a walk of its scene, as the subject of accuracy
-    studies (`geomech.studies.displacement.accuracy`). For every setting the reference has that
-    setting at `FINEST`. near: the walk, once it is computed."""
+    studies (`geomech.studies.displacement.accuracy`). For every setting the reference
+    has that setting at `FINEST`. near: the walk, once it is computed."""
 
     scene: WalkerScene
     runs: int = 1

@@ -230,8 +230,8 @@ def remember(memory, time, prints, bodies, poses, slopes) -> None:
     prints: grid, (6,), undisturbed heights (R, C), points (P, 3) on the geoms and the
     first of each geom, (G + 1,). bodies: numbers (G, 3) of geoms, bodies and roots, and
     spheres (G, 4) as of `rft.mujoco.bed.BedGeoms`. poses: arrays of
-    `rft.mujoco.memory.addresses.Arrays`. slopes: grid and frame of hills, (0, 0, 3) for none,
-    and up and level."""
+    `rft.mujoco.memory.addresses.Arrays`. slopes: grid and frame of hills, (0, 0, 3) for
+    none, and up and level."""
     grid, surface, points, first = prints
     numbers, spheres = bodies
     xpos, xmat, cvel, com = poses

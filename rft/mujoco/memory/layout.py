@@ -1,7 +1,8 @@
 """Names of the numbers that compiled code reads of a bed, in the order in which they
 stand in its `Layout`.
 
-`rft.mujoco.installed` writes them, `rft.mujoco.step.compiled` reads them by ``AT.name``."""
+`rft.mujoco.installed` writes them, `rft.mujoco.step.compiled` reads them by
+``AT.name``."""
 
 from __future__ import annotations
 

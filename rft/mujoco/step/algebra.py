@@ -1,5 +1,5 @@
-"""Linear algebra of small systems, by NumPy; `rft.mujoco.step.compiled_algebra` defines it a
-second time for compiled code.
+"""Linear algebra of small systems, by NumPy; `rft.mujoco.step.compiled_algebra` defines
+it a second time for compiled code.
 
 Geoms have Jacobians (G, 6, n), from the velocities of n degrees of freedom to the
 twists of the geoms along their own axes; only some of these move a geom."""

@@ -1,6 +1,6 @@
-"""The functions of `rft.mujoco.step.algebra` for compiled code, in loops: of a dozen degrees
-of freedom they take a fraction of what calls of LAPACK do. Importing this module loads
-numba."""
+"""The functions of `rft.mujoco.step.algebra` for compiled code, in loops: of a dozen
+degrees of freedom they take a fraction of what calls of LAPACK do. Importing this
+module loads numba."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""The loads of `rft.mujoco.step.parts` for compiled code, eight elements at once. Importing
-this module loads numba."""
+"""The loads of `rft.mujoco.step.parts` for compiled code, eight elements at once.
+Importing this module loads numba."""
 
 from __future__ import annotations
 
@@ -60,9 +60,9 @@ LOADS, SLOPES, ADD_DAMPERS = range(3)  # what the C function adds
 
 class Grains(NamedTuple):
     """What the loads of a step follow from. code, solver: addresses of the C functions
-    of `element_code` and of `rft.mujoco.step.compiled_solver.solver_code`. handle: (12,),
-    numbers and addresses that the first reads, by the names of `AT`. arrays: those
-    there, which must outlive it."""
+    of `element_code` and of `rft.mujoco.step.compiled_solver.solver_code`. handle:
+    (12,), numbers and addresses that the first reads, by the names of `AT`. arrays:
+    those there, which must outlive it."""
 
     code: int
     solver: int
@@ -121,10 +121,10 @@ def cut(table, spheres, first, zones, n_zones, frames, cache_first, in_reach):
     """Return the cache of all parts below the surface, and write the first part of each
     geom in each zone.
 
-    spheres: (R, 4), `rft.terradynamics.meshes.forces.blocks.Blocks.row_spheres`. frames:
-    (frames, middles, radii): `rft.mujoco.step.parts.Frames`, and middles (G, 3), m, and
-    radii (G,) of spheres around the geoms. in_reach: (G,), whether a geom may be in the
-    ground."""
+    spheres: (R, 4), `rft.terradynamics.meshes.forces.blocks.Blocks.row_spheres`.
+    frames: (frames, middles, radii): `rft.mujoco.step.parts.Frames`, and middles
+    (G, 3), m, and radii (G,) of spheres around the geoms. in_reach: (G,), whether a
+    geom may be in the ground."""
     frame, middles, radii = frames
     geoms = len(radii)
     capacity = 0

@@ -1,5 +1,5 @@
-"""The solution of a block (`rft.mujoco.step.implicit.solve_block`) as a C function of its
-own. Importing this module loads numba.
+"""The solution of a block (`rft.mujoco.step.implicit.solve_block`) as a C function of
+its own. Importing this module loads numba.
 
 Compiled within the callback it would be optimised anew with each function above it: two
 minutes in place of some seconds."""

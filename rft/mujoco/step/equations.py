@@ -37,9 +37,10 @@ class Inputs(NamedTuple):
     """All that the motion of a model's n degrees of freedom in a step follows from,
     without the grains.
 
-    inertia, effective: (n, n), M and N of `rft.mujoco.step.implicit`. is_damped: whether
-    these differ. force, velocity, start: (n,), tau, v and the acceleration to start
-    from. step: s. jacobian, dofs, first: of all geoms, as of `Motion`. in_ground: (G,).
+    inertia, effective: (n, n), M and N of `rft.mujoco.step.implicit`. is_damped:
+    whether these differ. force, velocity, start: (n,), tau, v and the acceleration to
+    start from. step: s. jacobian, dofs, first: of all geoms, as of `Motion`. in_ground:
+    (G,).
     rows: those of MuJoCo's constraints, by all degrees of freedom. trees: (n,), of each
     degree of freedom."""
 

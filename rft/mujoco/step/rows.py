@@ -13,7 +13,8 @@ T and D_m = D_1 / (mu^2 (1 + mu^2)),
 
     above the cone (N >= mu T)          f = 0,
     below it (mu N + T <= 0)            f = -D u,
-    between                             f_1 = -D_m mu (N - mu T),   f_j = D_m mu (N - mu T) s_j^2 u_j / T.
+    between                             f_1 = -D_m mu (N - mu T),
+                                        f_j = D_m mu (N - mu T) s_j^2 u_j / T.
 
 Compiled code takes these functions, too."""
 

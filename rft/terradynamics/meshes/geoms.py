@@ -40,9 +40,9 @@ def mesh_of_elements(
     length: m, of the edges, about; None for as many triangles as the shape of the geom
     needs, with which 90 % of random motions have an error of the force below 3 %, and
     none has one above 6 %. Of a mesh geom, triangles that are larger are halved, and
-    those that are smaller are merged (`rft.terradynamics.meshes.surfaces.merged`). share: factor
-    of the lengths of edges where ``length`` is None. hulls: whether the convex hull
-    stands for a mesh without an inside."""
+    those that are smaller are merged (`rft.terradynamics.meshes.surfaces.merged`).
+    share: factor of the lengths of edges where ``length`` is None. hulls: whether the
+    convex hull stands for a mesh without an inside."""
     kind = geom_kind(model, geom)
     size = np.array(model.geom_size[geom])
     if kind == "box":

@@ -1,5 +1,6 @@
 """Force and moment of grains on a rigid mesh in any motion: the law of
-`rft.terradynamics.meshes.forces.law` face by face (`rft.terradynamics.meshes.forces.contact`).
+`rft.terradynamics.meshes.forces.law` face by face
+(`rft.terradynamics.meshes.forces.contact`).
 
 The error is of order 2 in the size of triangles where the surface is smooth and
 neighbouring triangles meet at less than the medium's ``grazing`` angle.

@@ -159,7 +159,8 @@ class Engine(Protocol):
 
         A walk lasts ``cycles`` cycles, by default the duration of the numerics, or
         until the robot's end. progress: receives the finished fraction. advance:
-        computes a stride, as `rft.terradynamics.walking.planar.stride.compute_stride`."""
+        computes a stride, as
+        `rft.terradynamics.walking.planar.stride.compute_stride`."""
         ...
 
     def rerun(

@@ -5,9 +5,9 @@ takes `SUBSTEPS` steps for each time step, and cuts an element of a leg or belly
 `PIECES`, which makes both errors as small as those of the planar engine.
 
 A robot of the vertical plane becomes a hull on legs at both sides that is free to roll,
-yaw and drift (`rft.terradynamics.walking.spatial.hexapod`); a custom MJCF is used as it is. A
-walk ends with the stride that repeats the last one. `Simulation` computes strides by
-`rft.terradynamics.walking.spatial.multibody`.
+yaw and drift (`rft.terradynamics.walking.spatial.hexapod`); a custom MJCF is used as it
+is. A walk ends with the stride that repeats the last one. `Simulation` computes strides
+by `rft.terradynamics.walking.spatial.multibody`.
 """
 
 from __future__ import annotations

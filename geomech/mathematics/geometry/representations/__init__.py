@@ -1,1 +1,2 @@
-"""Functions of shape: on grids and planes, around a gait, by symmetry, over directions."""
+"""Functions of shape: on grids and planes, around a gait, by symmetry, over
+directions."""

@@ -31,7 +31,8 @@ class SyntheticTrial(NamedTuple):
     exact: np.ndarray
 
     def trial(self, name: str = "synthetic") -> Trial:
-        """Return the trial as `geomech.studies.measured.midlines.reader.read` gives it."""
+        """Return the trial as `geomech.studies.measured.midlines.reader.read` gives
+        it."""
         frames, points = self.points.shape[:2]
         lines = 2 + np.arange(frames * points).reshape(frames, points)
         return Trial(

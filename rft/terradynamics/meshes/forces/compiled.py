@@ -101,8 +101,8 @@ def kernel(Law: type):
 def sum_loads(
     law, ground: Ground, table: np.ndarray, first: np.ndarray, motions: Motion
 ) -> np.ndarray:
-    """Return (B, C, 6): the same as `rft.terradynamics.meshes.forces.blocks.Blocks.loads`, by
-    the record of a law."""
+    """Return (B, C, 6): the same as
+    `rft.terradynamics.meshes.forces.blocks.Blocks.loads`, by the record of a law."""
     add_up = kernel(type(law))
     law_numbers = tuple(law)
     ground_numbers = tuple(map(float, ground[:-1]))

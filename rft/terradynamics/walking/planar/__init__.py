@@ -1,1 +1,2 @@
-"""Robots that walk in the vertical plane: their equations, time steps and limit cycles."""
+"""Robots that walk in the vertical plane: their equations, time steps and limit
+cycles."""

@@ -27,7 +27,8 @@ from rft.terradynamics.walking.planar.sdirk import (
     start_of_step,
 )
 
-# End heights of `rft.terradynamics.walking.planar.sdirk.has_ended` that no robot reaches.
+# End heights of `rft.terradynamics.walking.planar.sdirk.has_ended` that no robot
+# reaches.
 NO_END = (np.inf, np.inf)
 
 
@@ -39,8 +40,8 @@ def march(
 
     The steps go from phase to phase (S + 1,), in cycles. In each the legs rotate at the
     rates of the clock at ``rate_phases`` (S,), which determine the side of a kink.
-    end_heights: as for `rft.terradynamics.walking.planar.sdirk.has_ended`; a robot at an end
-    stays there."""
+    end_heights: as for `rft.terradynamics.walking.planar.sdirk.has_ended`; a robot at
+    an end stays there."""
     index = np.asarray(index)
     phases = np.asarray(phases)
     starts = np.broadcast_to(phases[:-1, None], (len(rate_phases), len(index)))

@@ -9,9 +9,10 @@ L-stable and stiffly accurate, by Newton's method on the three rates. Where Newt
 method fails, it goes through wider roundings of the law down to the law's own. Where
 this fails as well, the step is halved.
 
-All functions are formulas (`rft.formulas.vectors`): `rft.terradynamics.walking.planar.march`
-takes many robots through them side by side by NumPy,
-`rft.terradynamics.walking.planar.compiled` one after the other. Triples are (x, z, pitch)."""
+All functions are formulas (`rft.formulas.vectors`):
+`rft.terradynamics.walking.planar.march` takes many robots through them side by side by
+NumPy, `rft.terradynamics.walking.planar.compiled` one after the other. Triples are
+(x, z, pitch)."""
 
 from __future__ import annotations
 

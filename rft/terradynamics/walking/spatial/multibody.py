@@ -46,8 +46,8 @@ class Multibody:
         Compiled; gravity along -z, the surface at z = 0. It stays as it is.
     surfaces : sequence of Surface
         Those that touch the ground, for example from
-        `rft.terradynamics.walking.spatial.geoms.surfaces`. Their geoms touch grains and nothing
-        else, no floor either.
+        `rft.terradynamics.walking.spatial.geoms.surfaces`. Their geoms touch grains and
+        nothing else, no floor either.
     grains : Grains
         The ground.
     control : callable, optional
