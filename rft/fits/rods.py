@@ -249,29 +249,8 @@ def fit(
     2.0
     """
     fitted_law = FITS[law]
+    _check_end_caps(law, rod, end_caps)
     fits_caps = isinstance(end_caps, str)
-    require(
-        not fits_caps or end_caps == "fitted",
-        "end caps must be 'fitted' or a number",
-        value=end_caps,
-    )
-    if not fits_caps:
-        in_range("end caps", end_caps, 0, MOST_CAPS)
-    if end_caps:
-        require(
-            law == "granular",
-            f"end caps take the granular law, got {law}",
-            instead="leave them out",
-        )
-        require(
-            rod.radius and rod.length,
-            "end caps take the rod's radius and length",
-            instead="give both, or leave the caps out",
-        )
-        require(
-            rod.radius <= rod.length,
-            f"end caps take a rod longer than its radius, got {rod.length:g} m",
-        )
     if data.ends is not None and end_caps:
         require(
             fits_caps,
@@ -320,6 +299,34 @@ def fit(
         residuals=data.forces - _forces(law, rod, fixed_caps, data.psi, best.x),
         end_caps=float(best.x[-1]) if fits_caps else fixed_caps,
     )
+
+
+def _check_end_caps(law: str, rod: Rod, end_caps: float | str) -> None:
+    """Refuse end caps that are no number in range, and those without a law or a rod
+    that can have them."""
+    is_word = isinstance(end_caps, str)
+    require(
+        not is_word or end_caps == "fitted",
+        "end caps must be 'fitted' or a number",
+        value=end_caps,
+    )
+    if not is_word:
+        in_range("end caps", end_caps, 0, MOST_CAPS)
+    if end_caps:
+        require(
+            law == "granular",
+            f"end caps take the granular law, got {law}",
+            instead="leave them out",
+        )
+        require(
+            rod.radius and rod.length,
+            "end caps take the rod's radius and length",
+            instead="give both, or leave the caps out",
+        )
+        require(
+            rod.radius <= rod.length,
+            f"end caps take a rod longer than its radius, got {rod.length:g} m",
+        )
 
 
 def _with_ends(flank: Fit) -> Fit:
