@@ -24,7 +24,7 @@ import numpy as np
 from figures import main, style
 from figures.grains.beds import over_beds
 from figures.grains.campaigns import grains
-from figures.paper.fig08a_rods import on_face
+from figures.paper.fig08a_rods import face_stress
 from geomech import plots
 from rft.terradynamics.plates import Polygon, StressMap, loads
 
@@ -134,7 +134,7 @@ def fitted_maps(plates: dict, bar: dict) -> dict:
     on_bar = np.concatenate([bar[c].mean(1) for c in COMPONENTS])
     unit = {}
     for rule in RULES:
-        unit[rule] = dict(zip(COMPONENTS, on_face(StressMap(tension=rule), BETA)))
+        unit[rule] = dict(zip(COMPONENTS, face_stress(StressMap(tension=rule), BETA)))
     x = map_stress(unit["cut"], plates["beta"])
     zeta = float(x @ on_plates / (x @ x))
     maps = {}

@@ -554,7 +554,7 @@ def test_plates_in_grains_stand_beside_bars_and_the_map():
     """The rows of a bar add up to it; stress on them is force over their area and depth; grains press where the map pulls."""
     from figures.grains import plates as figure
     from figures.grains.campaigns import grains as campaign
-    from figures.paper.fig08a_rods import on_face
+    from figures.paper.fig08a_rods import face_stress
 
     rows, lift = campaign.read("faces"), campaign.read("lift")
     for key in ("drag_N", "lift_N"):
@@ -573,7 +573,7 @@ def test_plates_in_grains_stand_beside_bars_and_the_map():
         / (campaign.BAR_DEPTH + campaign.BAR * np.cos(bar["beta"]))
     }
     for rule, ratio in (("keep", 0.81), ("cut", 0.68)):
-        stress = on_face(StressMap(tension=rule), figure.BETA)
+        stress = face_stress(StressMap(tension=rule), figure.BETA)
         assert figure.lift_over_drag(deep, figure.BETA, *stress) == pytest.approx(
             ratio, abs=0.01
         )
