@@ -267,9 +267,11 @@ def faces(store: Path) -> Rows:
 
 def rear_half(bar: Spheres) -> Spheres:
     """Return the rear half of a round bar: a thin sheet whose hollow leads."""
-    at = bar.offsets[bar.offsets[:, 1] < 1e-9] + [0.0, (BAR - GRAIN) / 2, 0.0]
-    at = at[np.lexsort((at[:, 2], at[:, 0]))]
-    return replace(bar, at=at, link=bar.link[: len(at)], radius=bar.radius[: len(at)])
+    is_rear = bar.offsets[:, 1] < 1e-9
+    offsets = bar.offsets[is_rear] + [0.0, (BAR - GRAIN) / 2, 0.0]
+    offsets = offsets[np.lexsort((offsets[:, 2], offsets[:, 0]))]
+    n = len(offsets)
+    return replace(bar, offsets=offsets, link=bar.link[:n], radius=bar.radius[:n])
 
 
 def steady_towed(body: Spheres, seed: int, store: Path) -> SteadyForce:
