@@ -460,11 +460,11 @@ def test_the_figure_of_grains_shows_beds_beside_laws():
     )
     late = {
         case: (x["at_once"][0], 1e3 * x["travel"][0])
-        for case, x in numbers["stretches"].items()
+        for case, x in numbers["last_strokes"].items()
     }
     assert late[0.04, 0.0245, 90] == pytest.approx((0.32, 61.4), abs=0.05)
     assert late[0.02, 0.0150, 90] == pytest.approx((-0.03, 36.8), abs=0.05)
-    for (a, angle), way in numbers["ways"].items():  # fitted at 20 mm
+    for (a, angle), way in numbers["after_reversal"].items():  # fitted at 20 mm
         assert np.sqrt(np.mean((way["grains"] - way["law"]) ** 2)) < 0.11, (a, angle)
     assert "circle 1 rad" in figure.table(numbers)
     circles, others, lifts, right = figure.draw(numbers).axes
