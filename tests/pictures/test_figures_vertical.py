@@ -122,7 +122,9 @@ def test_fig08a_stress_around_the_cylinder_is_that_on_plates():
     found = fig08a_rods.compute(depths=3)
     around, normal, tangent = (
         found["cylinder"],
-        *fig08a_rods.face_stress(fig08a_rods.VERTICAL["glass-3mm"].stress, found["beta"]),
+        *fig08a_rods.face_stress(
+            fig08a_rods.VERTICAL["glass-3mm"].stress, found["beta"]
+        ),
     )
     for what in ("normal", "tangent"):
         assert (
@@ -174,8 +176,18 @@ def test_fig08b(tmp_path):
     # Each has its own peak and its own phase (Fig. 8(b)).
     assert c["z"]["peak"] > reversed_["z"]["peak"] > flat["z"]["peak"] > 1
     assert c["x"]["peak"] > flat["x"]["peak"] > reversed_["x"]["peak"] > 1
-    assert c["x"]["peak_angle"] < flat["x"]["peak_angle"] < 0 < reversed_["x"]["peak_angle"]
-    assert c["z"]["peak_angle"] < flat["z"]["peak_angle"] < 0 < reversed_["z"]["peak_angle"]
+    assert (
+        c["x"]["peak_angle"]
+        < flat["x"]["peak_angle"]
+        < 0
+        < reversed_["x"]["peak_angle"]
+    )
+    assert (
+        c["z"]["peak_angle"]
+        < flat["z"]["peak_angle"]
+        < 0
+        < reversed_["z"]["peak_angle"]
+    )
     assert (
         flat["z"]["least"] < -0.5
         and reversed_["z"]["least"] < -0.2
