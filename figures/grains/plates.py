@@ -21,6 +21,8 @@ it.
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from figures import main, style
@@ -225,7 +227,7 @@ def shell_lifts() -> dict:
 def table(numbers: dict) -> str:
     """Return stress on plates of two heights, lift over drag of bars, and the maps'
     misfits."""
-    columns = [(part, c) for part in PARTS for c in COMPONENTS]
+    columns = list(itertools.product(PARTS, COMPONENTS))
     rows = []
     for height, plates in numbers["plates"].items():
         for k, beta in enumerate(np.degrees(plates["beta"])):

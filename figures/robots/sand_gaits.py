@@ -77,7 +77,7 @@ def search(
 
 
 def compute(generations: int = 8, walks: int = 32, seconds: float = 3.0) -> dict:
-    """Return "clocks": {ground: (4,)}, "found": {ground: best speed by generation},
+    """Return "clocks": {ground: (4,)}, "best_speeds": {ground: by generation, m/s},
     "speeds": (2, 2), m/s, of the gaits for sand and floor (rows) in sand and on the
     floor (columns), and "strip", a cycle of the gait for sand in it."""
     # MuJoCo is an extra, and heavy.
@@ -105,14 +105,14 @@ def compute(generations: int = 8, walks: int = 32, seconds: float = 3.0) -> dict
 
         # A batch always runs all of its walks: the rest are copies.
         copies = [clocks["sand"]] * (walks - 2)
-        both = np.stack([clocks["sand"], clocks["floor"], *copies])
-        sand_speeds, path = walk(batches["sand"], both, seconds, step)
-        floor_speeds, _ = walk(batches["floor"], both, seconds, step)
+        all_clocks = np.stack([clocks["sand"], clocks["floor"], *copies])
+        sand_speeds, path = walk(batches["sand"], all_clocks, seconds, step)
+        floor_speeds, _ = walk(batches["floor"], all_clocks, seconds, step)
 
     steps_per_cycle = round(1 / (clocks["sand"][0] * step))
     return {
         "clocks": clocks,
-        "found": best_speeds,
+        "best_speeds": best_speeds,
         "speeds": np.stack([sand_speeds[:2], floor_speeds[:2]], 1),
         "strip": snapshots(soft, path[0], steps_per_cycle),
     }
@@ -178,7 +178,7 @@ def draw(numbers: dict):
     grid.set_height_ratios([3.0, 1.0])
     for ax in axes[1]:
         ax.remove()
-    draw_search(axes[0, 0], numbers["found"])
+    draw_search(axes[0, 0], numbers["best_speeds"])
     draw_speeds(axes[0, 1], numbers["speeds"])
     draw_strip(fig.add_subplot(grid[1, :]), numbers["strip"])
     return fig

@@ -59,7 +59,7 @@ def test_fig06b(tmp_path):
 def test_fig07(tmp_path):
     found = fig07_stress_maps.compute(cells=90)
     assert found["survey"].pulling == pytest.approx(0.13, abs=0.005)  # DESIGN section 9
-    off = {name: medium["off"] for name, medium in found["media"].items()}
+    off = {name: medium["difference"] for name, medium in found["media"].items()}
     assert off == pytest.approx(
         {"poppy-seeds-loose": 0.088, "poppy-seeds-close": 0.161}, abs=5e-4
     )

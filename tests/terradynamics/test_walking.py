@@ -1104,7 +1104,7 @@ def test_figures_of_walking_are_drawn(tmp_path, monkeypatch):
     assert left[-1] < 0.02 and (chattering > 0).all()
     left_of_energy = axes[walking_steps][1]
     np.testing.assert_allclose(curve(left_of_energy, "explicit"), [[64], chattering])
-    smooth, lugs = made[wheel]["found"].values()
+    smooth, lugs = made[wheel]["wheels"].values()
     np.testing.assert_allclose(
         curve(axes[wheel][3], "30 rad/s"),
         [made[wheel]["slip"], 1e3 * lugs[30.0].sinkage],

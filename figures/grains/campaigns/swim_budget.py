@@ -275,9 +275,9 @@ def gait_samples(question: GrainSwim) -> tuple[np.ndarray, np.ndarray]:
 
 
 def near_singular(question: GrainSwim, law: Fit, caps: EndCaps) -> np.ndarray:
-    """Return a mask (N,) of the quarter of the phases that is nearest to shapes where A,
-    fitted by least squares over directions, is singular in x and y; of no phase for
-    other than two joints."""
+    """Return a mask (N,) of the quarter of the phases with shapes nearest to those
+    where A, fitted by least squares over directions, is singular in x and y; of no
+    phase for a number of joints other than two."""
     if question.experiment.body.joints != 2:
         return np.zeros(PHASES, bool)
     rates = np.stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)], -1)
