@@ -210,8 +210,8 @@ def draw_series(ax, times: dict, unit) -> None:
     # All of a few sizes, every second of many.
     step = 1 if len(x) < 5 else 2
     ticks = x[::step]
-    style.named_ticks(ax, ticks, [f"{size:,.0f}" for size in ticks])
-    style.grid(ax)
+    style.set_named_ticks(ax, ticks, [f"{size:,.0f}" for size in ticks])
+    style.draw_grid(ax)
 
 
 if __name__ == "__main__":

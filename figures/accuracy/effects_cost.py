@@ -117,7 +117,7 @@ def draw(numbers: dict):
     ax.axvline(1.0, **style.GUIDE)
     ax.set(xlabel="time / time with no effect", xscale="log")
     ax.set(xlim=(0.5, 5 * max(ratios)))
-    style.legend_above(ax, 3, title="engine")
+    style.draw_legend_above(ax, 3, title="engine")
     return fig
 
 

@@ -297,7 +297,7 @@ def draw_stress(ax, numbers: dict, component: str, name: str) -> None:
         ax.errorbar(x, y, error, label=f"plates of {size}", **look)
         y, error = mean_and_error(1e3 * plates["whole"][component])
         ax.errorbar(x, y, error, mfc="white", label=f"{size}, with edges", **look)
-    style.zero_line(ax)
+    style.draw_zero_line(ax)
     ax.set(xlabel="tilt of the face (degrees)", xlim=(0, 180))
     ticks = ["0\nunderside", 45, "90\nfront", 135, "180\ntop"]
     ax.set_xticks(range(0, 181, 45), ticks)

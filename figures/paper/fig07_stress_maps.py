@@ -135,7 +135,7 @@ def draw_angle(ax, centre, start: float, stop: float, radius: float, label: str)
 def draw_coefficients(ax, numbers: dict) -> None:
     """Draw the coefficients of the media over their strength, and the generic set."""
     places = np.arange(len(numbers["names"]))
-    style.zero_line(ax)
+    style.draw_zero_line(ax)
     line = {"color": style.BLACK, "lw": 1.5, "marker": "*", "ms": 8}
     ax.plot(places, numbers["generic"], label="generic, $M_0$", **line)
     looks = zip((style.LOOSE, style.CLOSE), "os")

@@ -146,7 +146,7 @@ def draw(numbers: dict):
     draw_stress(axes[0, 0], numbers)
     draw_forces(axes[0, 1], numbers, "drag")
     draw_forces(axes[1, 0], numbers, "lift")
-    style.entry(axes[0, 1], "tension cut", ls="--")
+    style.add_entry(axes[0, 1], "tension cut", ls="--")
     axes[0, 1].legend(loc="upper left")
     draw_ratios(axes[1, 1], numbers)
     style.letter_panels(axes)
@@ -166,7 +166,7 @@ def draw_stress(ax, numbers: dict) -> None:
         ax.plot(beta, numbers[key], color=colour, label=f"{name}, plates")
         dots = {"color": colour, "mfc": "white", "ms": 4, "label": f"{name}, cylinder"}
         ax.plot(np.degrees(cylinder["beta"]), cylinder[key], marker, **dots)
-    style.zero_line(ax)
+    style.draw_zero_line(ax)
     ax.set(
         xlabel=r"tilt $\beta$ of the face: underside 0, front 90, top 180",
         ylabel="stress / depth (N/cm$^3$)",
@@ -181,13 +181,13 @@ def draw_forces(ax, numbers: dict, key: str) -> None:
     """Draw "drag" or "lift" against depth, dashed without tension."""
     depth = 1e2 * numbers["depth"]
     for k, (name, rod) in enumerate(numbers["rods"].items()):
-        look = style.sparse(k, len(depth))
+        look = style.curve_look(k, len(depth))
         ax.plot(depth, rod["keep"][key], label=name, **look)
         ax.plot(depth, rod["cut"][key], "--", **look | {"marker": ""})
     ax.set(xlabel="depth of the axis (cm)", ylabel=f"{key} (N)")
     ax.set(xlim=(0, 1e2 * DEEPEST))
     ax.set_xticks(range(0, 16, 5))
-    style.zero_line(ax)
+    style.draw_zero_line(ax)
 
 
 def draw_ratios(ax, numbers: dict) -> None:
@@ -196,9 +196,9 @@ def draw_ratios(ax, numbers: dict) -> None:
         ax.plot(k, rod["keep"]["ratio"], "o", ms=5, color=COLOURS[name])
         ax.plot(k, rod["cut"]["ratio"], "o", ms=9, mfc="none", color=COLOURS[name])
         draw_measured_sign(ax, k + 0.3, numbers["measured"][name])
-    style.entry(ax, "map as it is", ls="", marker="o", ms=5)
-    style.entry(ax, "tension cut", ls="", marker="o", ms=9, mfc="none")
-    style.zero_line(ax)
+    style.add_entry(ax, "map as it is", ls="", marker="o", ms=5)
+    style.add_entry(ax, "tension cut", ls="", marker="o", ms=9, mfc="none")
+    style.draw_zero_line(ax)
     ax.set(
         xticks=range(len(RODS)),
         xticklabels=[name.replace(", ", ",\n") for name in RODS],

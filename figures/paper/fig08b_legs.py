@@ -155,7 +155,7 @@ def draw_force(ax, numbers: dict, component: int, label: str) -> None:
         own = force[numbers["own"]]
         dot = {"marker": marker, "ms": 4, "markevery": [own.argmax()]}
         ax.plot(angle, own, color=colour, lw=1.4, **dot)
-    style.zero_line(ax)
+    style.draw_zero_line(ax)
     ax.axvline(0.0, **style.GUIDE)
     ax.set(xlabel=r"angle $\theta$ (degrees), 0: straight down", ylabel=label)
     ax.set(xlim=(-135, 135))
@@ -169,8 +169,8 @@ def draw_asymmetry(ax, numbers: dict) -> None:
         dot = {"color": LOOKS[name][0], "ms": 6}
         ax.plot(k - 0.1, forces["x"]["asymmetry"], "o", mfc="white", **dot)
         ax.plot(k + 0.1, forces["z"]["asymmetry"], "s", **dot)
-    style.entry(ax, "$F_x$", ls="", marker="o", ms=6, mfc="white")
-    style.entry(ax, "$F_z$", ls="", marker="s", ms=6)
+    style.add_entry(ax, "$F_x$", ls="", marker="o", ms=6, mfc="white")
+    style.add_entry(ax, "$F_z$", ls="", marker="s", ms=6)
     ax.set(
         xticks=range(len(LEGS)),
         xticklabels=[LABELS[name].replace(" c", "\nc") for name in LEGS],

@@ -170,7 +170,7 @@ def draw(numbers: dict):
     axes[-2, 1].set_xlabel(r"$A/\lambda$")
     for ax, name in zip(axes[-1], ("sandfish-loose", "sandfish-close")):
         draw_cycle(ax, numbers[name]["cycle"], name)
-        style.legend_above(ax, 3, columnspacing=1.0, handlelength=1.6)
+        style.draw_legend_above(ax, 3, columnspacing=1.0, handlelength=1.6)
     axes[-1, 0].set_ylabel("body velocity")
     fig.align_ylabels(axes[:, 0])
     draw_legend(fig, axes[0, 0], loose["animal"])
@@ -258,17 +258,17 @@ def draw_cycle(ax, velocity: np.ndarray, name: str) -> None:
     )
     for values, (dashes, label) in zip(closed.T, looks):
         ax.plot(t, values, ls=dashes, color=SCENES[name], label=label)
-    style.zero_line(ax)
+    style.draw_zero_line(ax)
     medium = name.replace("-", " ")
-    style.phase_axis(ax, label=f"phase of the cycle (rad), {medium}")
+    style.set_phase_axis(ax, label=f"phase of the cycle (rad), {medium}")
 
 
 def draw_legend(fig, ax, animal: float) -> None:
     """Draw the legend of all panels but the last two, above them."""
     for wave in ENDLESS.values():
-        style.entry(ax, wave.label, ls=wave.dashes, lw=1.0)
-    style.entry(ax, "optimum (open: endless)", ls="", marker="o", ms=5)
-    style.entry(ax, rf"sandfish, $A/\lambda = {animal:g}$", **style.GUIDE, ls="-.")
+        style.add_entry(ax, wave.label, ls=wave.dashes, lw=1.0)
+    style.add_entry(ax, "optimum (open: endless)", ls="", marker="o", ms=5)
+    style.add_entry(ax, rf"sandfish, $A/\lambda = {animal:g}$", **style.GUIDE, ls="-.")
     fig.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=3)
 
 

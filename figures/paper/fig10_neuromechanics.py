@@ -139,7 +139,7 @@ def draw_map(ax, one: dict) -> None:
         ax.plot(s, one[key] + 2 * np.pi, **look)
     ax.fill([], [], label="bending to the right", **style.SHADED)
     ax.set(xlabel="place on the body, tail 0 to head 1", xlim=(0, 1))
-    style.phase_axis(ax, "y")
+    style.set_phase_axis(ax, "y")
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0))
 
 
@@ -161,9 +161,9 @@ def draw_trace(ax, one: dict) -> None:
     for key, dashes in BOUNDS:
         phase = np.mod(one[key][k], 2 * np.pi)
         ax.axvline(phase, color=style.GREEN, ls=dashes, lw=1.0)
-    style.zero_line(ax)
+    style.draw_zero_line(ax)
     ax.set(ylabel=f"over its largest value, at s = {PLACE}", ylim=(-1.1, 1.1))
-    style.phase_axis(ax)
+    style.set_phase_axis(ax)
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0))
 
 
@@ -180,7 +180,7 @@ def draw_lag(ax, numbers: dict) -> None:
         ylabel="activation ahead of curvature (rad)",
         xlim=(0, 1),
     )
-    style.quarter_ticks(ax, "y", 4)
+    style.set_quarter_ticks(ax, "y", 4)
     ax.legend(title="waves on the body", loc="upper right", ncols=2)
 
 
@@ -196,7 +196,7 @@ def draw_speed(ax, numbers: dict) -> None:
         look = {"color": colour, "marker": marker, "markevery": 4}
         ax.plot(waves, numbers[key], label=label, **look)
         ax.plot(waves, head[key], ls="--", lw=1.0, **look)
-    style.entry(ax, "with head drag", ls="--", lw=1.0)
+    style.add_entry(ax, "with head drag", ls="--", lw=1.0)
     ax.axhline(1.0, **style.GUIDE)
     ax.set(
         xlabel="waves on the body",

@@ -78,7 +78,7 @@ def draw_sweep(ax, result, unit: str, per_hertz: float) -> None:
     values, frequencies = parameters(result).values()
     names = [f"{per_hertz * f:.3g} {unit}" for f in frequencies]
     curves(ax, list(values), result, names)
-    style.zero_line(ax)
+    style.draw_zero_line(ax)
     ax.set_ylabel("mean speed (m/s)")
 
 

@@ -92,7 +92,7 @@ def draw_errors(ax, errors: dict) -> None:
     for setting, (values, error) in errors.items():
         line, colour = looks[setting]
         ax.loglog(values, error, line, color=colour, lw=1.0, label=setting)
-        style.order_line(ax, values, error, ORDERS[setting])
+        style.draw_order_line(ax, values, error, ORDERS[setting])
     ax.set(xlabel="steps of a cycle, elements", ylabel="error of the way")
     ax.set_xticks([4, 8, 16, 32, 64], ["4", "8", "16", "32", "64"])
     ax.set_xticks([], minor=True)

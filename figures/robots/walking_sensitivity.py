@@ -170,7 +170,7 @@ def draw(numbers: dict):
         for ax in row[1:]:
             ax.tick_params(labelleft=False)
         row[0].set_ylabel(f"{robot}: speed (m/s)")
-        style.legend_right(row[-1])
+        style.draw_legend_right(row[-1])
     fig.supxlabel("times the size that is assumed; open: not walking", fontsize=9)
     return fig
 
@@ -192,7 +192,7 @@ def draw_assumption(ax, name: str, curves: dict) -> None:
             face = colour if status == "walking" else "white"
             ax.plot(place, speed, marker, ms=4, color=colour, mfc=face)
     ax.set(xscale="log", xlabel="", ylim=(min(0.0, ax.get_ylim()[0]), None))
-    style.named_ticks(ax, x, labels)
+    style.set_named_ticks(ax, x, labels)
     if name in CHOICES:
         ax.set_xlim(0.75, 2.7)
     ax.set_title(NAMES[name], fontsize=7.5)

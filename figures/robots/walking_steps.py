@@ -100,7 +100,7 @@ def draw(numbers: dict):
         draw_convergence(error_ax, methods, 1, "error of the progress")
         draw_convergence(residual_ax, methods, 2, "energy not accounted for")
         error_ax.set_title(f"{frequency:g} Hz")
-    style.legend_right(axes[0, -1])
+    style.draw_legend_right(axes[0, -1])
     return fig
 
 
@@ -113,9 +113,9 @@ def draw_convergence(ax, methods: dict, k: int, label: str) -> None:
         values = np.where(np.isfinite(entries[k]), entries[k], np.nan)
         ax.loglog(entries[0], values, line, color=colour, lw=1.0, label=method)
     implicit = methods["implicit"]
-    style.order_line(ax, implicit[0], implicit[k], 2)
+    style.draw_order_line(ax, implicit[0], implicit[k], 2)
     ax.set(xlabel="steps of a cycle", ylabel=label)
-    style.grid(ax)
+    style.draw_grid(ax)
 
 
 if __name__ == "__main__":

@@ -77,13 +77,13 @@ def draw_gait(column, name: str, gait_numbers: dict) -> None:
     distance_ax.plot(amplitude, exact, color="0.72", lw=4, label="force balance")
     for k, frame in enumerate(FRAMES, 1):
         poses = gait_numbers[frame]
-        look = style.sparse(k, len(amplitude))
+        look = style.curve_look(k, len(amplitude))
         by_area = net_distance(poses["area"])
         distance_ax.plot(amplitude, by_area, label=f"area, {frame} frame", **look)
         error_ax.plot(amplitude, position_error(poses, "area"), **look)
     path_error = position_error(gait_numbers["mean"], "path")
     error_ax.plot(amplitude, path_error, ":", color=style.BLACK)
-    style.entry(distance_ax, "path, any frame", ls=":", color=style.BLACK)
+    style.add_entry(distance_ax, "path, any frame", ls=":", color=style.BLACK)
     _, _, label = GAITS[name]
     distance_ax.set(title=name, ylabel="net distance (BL)", ylim=(0, None))
     error_ax.set(xlabel=label, ylabel="off the force balance by (BL)", ylim=(0, None))

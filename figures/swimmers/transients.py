@@ -105,9 +105,9 @@ def draw_velocity(ax, numbers: dict) -> None:
         k = int(np.argmin(np.abs(numbers["shares"] - share)))
         label = "steady drag" if share == 0 else f"travel {share:.1f} $A$"
         ax.plot(numbers["t"], numbers["velocity"][k], dashes, color=colour, label=label)
-    style.phase_axis(ax)
+    style.set_phase_axis(ax)
     ax.set(ylabel=rf"$\xi_x$ (BL/rad), $A/\lambda$ = {ANIMAL:g}", ylim=(0, None))
-    style.legend_above(ax, 3)
+    style.draw_legend_above(ax, 3)
 
 
 if __name__ == "__main__":

@@ -110,7 +110,7 @@ def draw_inertia(ax, numbers: dict) -> None:
     ax.axhline(SHARE, **style.GUIDE)
     ax.set_xlabel("rate of turning (rpm)")
     ax.set_ylabel("added by grain inertia / force without")
-    style.named_ticks(ax, rates, [str(rate) for rate in rates])
+    style.set_named_ticks(ax, rates, [str(rate) for rate in rates])
     ax.legend(loc="upper left")
 
 
@@ -127,7 +127,7 @@ def draw_peaks(ax, numbers: dict) -> None:
         ax.plot(shares, numbers[name], line, lw=1.0, color=colour, label=label)
     ax.set(xlabel="share", ylabel="peak lift / that without")
     ax.set(xlim=(0, 1), ylim=(0, 1.02))
-    style.legend_above(ax)
+    style.draw_legend_above(ax)
 
 
 def draw_lift(ax, numbers: dict) -> None:
@@ -137,9 +137,9 @@ def draw_lift(ax, numbers: dict) -> None:
         label = "untouched"
         if place is not None:
             label = f"earlier at x = {1e3 * place:g} mm"
-        ax.plot(angle, lift, lw=1.0, label=label, **style.sparse(k, len(angle)))
+        ax.plot(angle, lift, lw=1.0, label=label, **style.curve_look(k, len(angle)))
     ax.set(xlabel="angle of the leg (degrees)", ylabel="lift (N)")
-    style.legend_above(ax, 2)
+    style.draw_legend_above(ax, 2)
 
 
 if __name__ == "__main__":

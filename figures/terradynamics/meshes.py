@@ -144,7 +144,7 @@ def draw_tilts(ax, numbers: dict) -> None:
         look = {"lw": 1.0, "color": colour}
         ax.plot(tilt, numbers["two"][1][:, k], "--", **look)
         ax.plot(tilt, numbers["three"][1][:, k], label=label, **look)
-    style.zero_line(ax)
+    style.draw_zero_line(ax)
     ax.set(
         xlabel=r"tilt $\beta$ (degrees)",
         ylabel=r"$\alpha_z$ / that straight down",

@@ -126,7 +126,7 @@ def draw_screw(thrust_ax, torque_ax, numbers: dict) -> None:
     for (height, screw), shade in zip(numbers["turning"].items(), shades):
         thrust_ax.plot(slip, screw.thrust, color=shade, label=height_text(height))
         torque_ax.plot(slip, 1e3 * screw.torque, color=shade)
-    style.zero_line(thrust_ax)
+    style.draw_zero_line(thrust_ax)
     thrust_ax.set(xlabel="slip", ylabel="thrust (N)", title="one screw")
     thrust_ax.legend(title="axis", alignment="left")
     torque_ax.set(xlabel="slip", ylabel="torque (mN m)", ylim=(0.0, None))
@@ -159,7 +159,7 @@ def draw_paths(ax, paths: dict) -> None:
         t = np.linspace(0.0, time, 200)[:, None]
         arc = se2.exp(t * [*steady.velocity, steady.yaw_rate])
         ax.plot(1e2 * arc[:, 0], 1e2 * arc[:, 1], "--", lw=0.8, color=shade)
-    style.entry(ax, "by balance", ls="--", lw=0.8)
+    style.add_entry(ax, "by balance", ls="--", lw=0.8)
     ax.set(xlabel="$x$ (cm)", ylabel="$y$ (cm), to the left", aspect="equal")
     ax.legend(loc="lower right")
 

@@ -46,7 +46,7 @@ def draw(numbers: dict):
                 look |= {"lw": 2.0, "label": "no inertia, any rate"}
             pull_ax.plot(numbers["slip"], line.pull / numbers["load"], **look)
             sinkage_ax.plot(numbers["slip"], 1e3 * line.sinkage, **look)
-        style.zero_line(pull_ax)
+        style.draw_zero_line(pull_ax)
         pull_ax.set(title=name, ylabel="drawbar pull / load")
         sinkage_ax.set(xlabel="slip", ylabel="sinkage (mm)")
         sinkage_ax.invert_yaxis()
