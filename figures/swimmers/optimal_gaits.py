@@ -14,7 +14,7 @@ the displacement of a stroke and shrinks the loop: a fluid of that ratio has 0.4
 
 In the fluid the stroke for displacement follows the zero line of the CCF, and that for
 efficiency cuts the far ends off, where little area is left for much path. In sand the
-CCF is that of a least-squares connection, which does not hold all of the displacement.
+CCF is that of a least-squares connection, which does not give all the displacement.
 """
 
 from __future__ import annotations
