@@ -34,7 +34,7 @@ def shades(count: int) -> list:
     return [cm.batlow(x) for x in np.linspace(0.0, 0.8, count)]
 
 
-def sparse(k: int, points: int) -> dict:
+def curve_look(k: int, points: int) -> dict:
     """Return the look of curve ``k`` of several without an order: a colour, and a
     marker at four of its points."""
     # Each curve starts elsewhere, so that markers of equal curves do not coincide.
@@ -47,12 +47,12 @@ def sparse(k: int, points: int) -> dict:
     }
 
 
-def zero_line(ax) -> None:
+def draw_zero_line(ax) -> None:
     """Draw a grey line at the height zero."""
     ax.axhline(0.0, **GUIDE)
 
 
-def order_line(ax, x, error, order: int) -> None:
+def draw_order_line(ax, x, error, order: int) -> None:
     """Draw errors that fall as x^-order from the first of ``error``, on logarithmic
     axes."""
     x = np.asarray(x, float)
@@ -60,25 +60,27 @@ def order_line(ax, x, error, order: int) -> None:
     ax.plot(x, line, **GUIDE, ls="--", label=f"order {order}")
 
 
-def quarter_ticks(ax, which: str, count: int = 5) -> None:
+def set_quarter_ticks(ax, which: str, count: int = 5) -> None:
     """Mark the first quarters of a cycle on an axis, "x" or "y"."""
     ticks = np.pi / 2 * np.arange(count)
     ax.set(**{f"{which}ticks": ticks, f"{which}ticklabels": QUARTERS[:count]})
 
 
-def phase_axis(ax, which: str = "x", label: str = "phase of the cycle (rad)") -> None:
+def set_phase_axis(
+    ax, which: str = "x", label: str = "phase of the cycle (rad)"
+) -> None:
     """Set an axis, "x" or "y", to the phase over one cycle."""
-    quarter_ticks(ax, which)
+    set_quarter_ticks(ax, which)
     ax.set(**{f"{which}lim": (0, 2 * np.pi), f"{which}label": label})
 
 
-def named_ticks(ax, values, names: Sequence[str]) -> None:
+def set_named_ticks(ax, values, names: Sequence[str]) -> None:
     """Label only these values of the x axis."""
     ax.set_xticks(values, names)
     ax.minorticks_off()
 
 
-def grid(ax) -> None:
+def draw_grid(ax) -> None:
     """Draw grid lines, from which a reader takes values."""
     ax.grid(True, which="major", lw=0.3, color="0.85")
 
@@ -89,18 +91,18 @@ def letter_panels(axes) -> None:
         ax.set_title(f"({letter})", loc="left")
 
 
-def entry(ax, label: str, **look) -> None:
+def add_entry(ax, label: str, **look) -> None:
     """Add an entry to the legend for a look that several curves share, grey by
     default."""
     ax.plot([], [], label=label, **{"color": "0.3", **look})
 
 
-def legend_above(ax, columns: int = 1, **more) -> None:
+def draw_legend_above(ax, columns: int = 1, **more) -> None:
     """Draw the legend above the axes."""
     ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, **more)
 
 
-def legend_right(ax, **more) -> None:
+def draw_legend_right(ax, **more) -> None:
     """Draw the legend to the right of the axes."""
     ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), **more)
 

@@ -1,9 +1,10 @@
-"""The cost of a balance of forces: microseconds a sample against the size of a batch,
-by both back ends, on one core and on all, beside the usual loop of SciPy's; and time
-against links, directions and phases, with fitted exponents."""
+"""The cost of a balance of forces: microseconds per sample against the size of a batch,
+by both backends, on one core and on all, compared with the usual loop of SciPy's; and
+time against links, directions and phases, with fitted exponents."""
 
 from __future__ import annotations
 
+import functools
 import os
 import timeit
 from collections.abc import Callable
@@ -27,11 +28,11 @@ TAN2 = np.tan(np.radians(13.8)) ** 2
 C = 1.8
 
 
-def one_scipy_solve(alpha, alphadot, segments=20):
-    """Solve one balance as one would by hand: midpoint segments in the middle link's
-    frame, Eqs. 2-3 as printed, fsolve."""
+def one_scipy_solve(alpha, alphadot, elements=20):
+    """Return one balance solved in the plainest way: midpoint elements in the middle
+    link's frame, Eqs. 2-3 as printed, fsolve."""
     half = 1 / 6
-    s = ((np.arange(segments) + 0.5) / segments * 2 - 1) * half
+    s = ((np.arange(elements) + 0.5) / elements * 2 - 1) * half
     headings = np.array([-alpha[0], 0.0, alpha[1]])
     turns = np.array([-alphadot[0], 0.0, alphadot[1]])
     t = np.stack([np.cos(headings), np.sin(headings)], -1)[:, None]
@@ -51,17 +52,18 @@ def one_scipy_solve(alpha, alphadot, segments=20):
         moment = place[..., 0] * f[..., 1] - place[..., 1] * f[..., 0]
         return [f[..., 0].sum(), f[..., 1].sum(), moment.sum()]
 
-    return fsolve(
-        force, [0.02, 0.01, 0.1], full_output=True
-    )  # off zero, where a link may stand still
+    # The start is not zero, where a link may stand still.
+    return fsolve(force, [0.02, 0.01, 0.1], full_output=True)
 
 
 def backends() -> list[str]:
     """Return the names of NumPy and, where numba is installed, of compiled code."""
-    return ["numpy", *(["numba"] * backend.installed())]
+    if backend.installed():
+        return ["numpy", "numba"]
+    return ["numpy"]
 
 
-def quickest(f: Callable, repeats: int = REPEATS) -> float:
+def shortest_time(f: Callable, repeats: int = REPEATS) -> float:
     """Return the seconds that the quickest of several calls takes."""
     return min(timeit.repeat(f, number=1, repeat=repeats))
 
@@ -70,116 +72,146 @@ def random_samples(links: int, count: int):
     """Return shapes and rates (count, links - 1) within what such a body can bend."""
     rng = np.random.default_rng(links)
     spread = 2.5 / np.sqrt(links / 3)
-    return rng.uniform(-spread, spread, (count, links - 1)), rng.normal(
-        size=(count, links - 1)
-    )
+    alpha = rng.uniform(-spread, spread, (count, links - 1))
+    alphadot = rng.normal(size=(count, links - 1))
+    return alpha, alphadot
 
 
-def solver(how: str, threads: int | None = None) -> Callable:
-    """Return the velocity of a chain in loose glass by a back end, None for all
-    threads."""
+def chain_velocity(name: str, threads: int | None = None) -> Callable:
+    """Return the velocity of a chain in loose glass by a backend, as a function of
+    shapes and rates; threads None: all."""
 
     def velocity(alpha, alphadot):
         chain = Chain((1,) * (np.shape(alpha)[-1] + 1))
-        return (
-            body_velocity(GLASS, chain, alpha, alphadot, backend=how, threads=threads)
-            .checked()
-            .xi
+        balance = body_velocity(
+            GLASS, chain, alpha, alphadot, backend=name, threads=threads
         )
+        return balance.checked().xi
 
     return velocity
 
 
-def batches(scale: int) -> dict:
-    """Return the seconds of a batch, by back end and cores, and of SciPy's loop the
-    seconds of a sample."""
+def compute(scale: int = 1) -> dict:
+    """Return {axis: {"x": [...], "seconds": {series: [...]}, "exponent": p}}, where the
+    exponent is that of NumPy over the larger half.
+
+    The axis "samples" also has "loop", the seconds of a sample in SciPy's loop. scale:
+    divides all sizes.
+    """
+
+    def solve_samples(velocity, links):
+        velocity(*random_samples(links, 2000 // scale))
+
+    def fit_connection(velocity, directions):
+        connection.fit(velocity, connection.grid(2, 31 // scale), directions)
+
+    def run_cycle(velocity, phases):
+        direct(velocity, Circle(), phases=phases)
+
+    phases = [n // scale for n in (500, 2000, 8000, 32000)]
+    return {
+        "samples": batch_times(scale),
+        "links": times_by_size([3, 6, 12, 25, 50, 100], solve_samples),
+        "directions": times_by_size([4, 8, 16, 32, 64], fit_connection),
+        "phases": times_by_size(phases, run_cycle),
+    }
+
+
+def batch_times(scale: int) -> dict:
+    """Return the seconds of batches by backend and cores, and the seconds of a sample
+    in SciPy's loop."""
     sizes = [max(1, n // scale) for n in (1, 8, 64, 512, 4096, 32768)]
-    series = {}
-    for how in backends():
+
+    def solve_batch(velocity, size):
+        velocity(*random_samples(3, size))
+
+    seconds = {}
+    for name in backends():
         for threads, cores in ((1, "one core"), (None, f"{os.cpu_count()} cores")):
-            velocity = solver(how, threads)
-            velocity(*random_samples(3, 2))  # loads what is loaded once
-            series[f"{NAMES[how]}, {cores}"] = [
-                quickest(lambda n=n: velocity(*random_samples(3, n))) for n in sizes
-            ]
+            velocity = chain_velocity(name, threads)
+            solve_batch(velocity, 2)  # compiles and loads what later calls need
+            times = series(solve_batch, velocity, sizes)
+            seconds[f"{NAMES[name]}, {cores}"] = times
+
     samples = list(zip(*random_samples(3, 40 // scale + 1)))
+
+    def solve_in_loop():
+        for alpha, alphadot in samples:
+            one_scipy_solve(alpha, alphadot)
+
     return {
         "x": sizes,
-        "seconds": series,
-        "loop": quickest(lambda: [one_scipy_solve(*s) for s in samples]) / len(samples),
+        "seconds": seconds,
+        "loop": shortest_time(solve_in_loop) / len(samples),
+        "exponent": exponent(sizes, seconds),
     }
 
 
-def compute(scale: int = 1) -> dict:
-    """Return {axis: {"x": [...], "seconds": {series: [...]}, "exponent": p}}, the
-    exponent being NumPy's over the larger half.
+def times_by_size(sizes: list[int], run: Callable) -> dict:
+    """Return the seconds of run(velocity, size) for each size, by backend on all
+    cores."""
+    seconds = {}
+    for name in backends():
+        seconds[NAMES[name]] = series(run, chain_velocity(name), sizes)
+    return {"x": sizes, "seconds": seconds, "exponent": exponent(sizes, seconds)}
 
-    The axis "samples" has "loop", too. scale: divides all sizes.
-    """
-    sizes = {
-        "links": (
-            [3, 6, 12, 25, 50, 100],
-            lambda f, n: f(*random_samples(n, 2000 // scale)),
-        ),
-        "directions": (
-            [4, 8, 16, 32, 64],
-            lambda f, n: connection.fit(f, connection.grid(2, 31 // scale), n),
-        ),
-        "phases": (
-            [n // scale for n in (500, 2000, 8000, 32000)],
-            lambda f, n: direct(f, Circle(), phases=n),
-        ),
-    }
-    out = {"samples": batches(scale)}
-    for axis, (x, run) in sizes.items():
-        series = {
-            NAMES[how]: [quickest(lambda n=n: run(solver(how), n)) for n in x]
-            for how in backends()
-        }
-        out[axis] = {"x": x, "seconds": series}
-    for found in out.values():
-        half, (seconds, *_) = len(found["x"]) // 2, found["seconds"].values()
-        x = np.log(found["x"][half - 1 :])
-        found["exponent"] = float(np.polyfit(x, np.log(seconds[half - 1 :]), 1)[0])
-    return out
+
+def series(run: Callable, velocity: Callable, sizes: list[int]) -> list[float]:
+    """Return the seconds of run(velocity, size) for each size."""
+    return [shortest_time(functools.partial(run, velocity, size)) for size in sizes]
+
+
+def exponent(sizes: list[int], seconds: dict) -> float:
+    """Return the slope of log seconds of the first series over log size, over the
+    larger half of the sizes."""
+    first = next(iter(seconds.values()))
+    start = len(sizes) // 2 - 1
+    slope = np.polyfit(np.log(sizes[start:]), np.log(first[start:]), 1)[0]
+    return float(slope)
 
 
 @plots.styled
 def draw(numbers: dict):
+    """Draw microseconds per sample at the left, and seconds against the other sizes."""
     fig, axes = plots.figure(10.6, 3.0, 4, width_ratios=(1.7, 1, 1, 1))
-    for ax, (axis, found) in zip(axes[0], numbers.items()):
-        x = np.array(found["x"], float)
-        loop = found.get("loop")
-        per = x / 1e6 if loop else np.ones_like(x)  # microseconds a sample, or seconds
-        for name, seconds in found["seconds"].items():
-            colour, marker = LOOKS[name.partition(",")[0]]
-            look = {"ls": "--", "mfc": "white"} if name.endswith("one core") else {}
-            ax.loglog(x, seconds / per, color=colour, marker=marker, label=name, **look)
-        if loop:
-            ax.axhline(1e6 * loop, **style.GUIDE, ls=":")
-            ax.text(
-                x[-1],
-                1.1e6 * loop,
-                "a loop of scipy.optimize.fsolve",
-                ha="right",
-                va="bottom",
-                fontsize=8,
-            )
-            ax.set(
-                xlabel="samples in a batch",
-                ylabel="microseconds a sample",
-                title="Cost of a balance of forces",
-            )
-            ax.set_ylim(top=1e7 * loop)
+    for ax, (axis, times) in zip(axes[0], numbers.items()):
+        if axis == "samples":
+            draw_batches(ax, times)
         else:
-            ax.set(
-                xlabel=axis, ylabel="seconds", title=f"exponent {found['exponent']:.2f}"
-            )
-        ticks = x[:: 1 if len(x) < 5 else 2]
-        style.named_ticks(ax, ticks, [f"{v:,.0f}" for v in ticks])
-        style.grid(ax)
+            draw_series(ax, times, 1.0)
+            ax.set(xlabel=axis, ylabel="seconds")
+            ax.set_title(f"exponent {times['exponent']:.2f}")
     axes[0, 0].legend(loc="center right", bbox_to_anchor=(1.0, 0.56))
     return fig
+
+
+def draw_batches(ax, times: dict) -> None:
+    """Draw microseconds per sample against the size of a batch, and SciPy's loop."""
+    size = np.array(times["x"], float)
+    draw_series(ax, times, size / 1e6)
+    loop = 1e6 * times["loop"]
+    ax.axhline(loop, **style.GUIDE, ls=":")
+    note = {"ha": "right", "va": "bottom", "fontsize": 8}
+    ax.text(size[-1], 1.1 * loop, "a loop of scipy.optimize.fsolve", **note)
+    ax.set(xlabel="samples in a batch", ylabel="microseconds a sample")
+    ax.set(title="Cost of a balance of forces")
+    ax.set_ylim(top=10 * loop)
+
+
+def draw_series(ax, times: dict, unit) -> None:
+    """Draw the seconds of each series over a unit, one number or one for each size."""
+    x = np.array(times["x"], float)
+    for name, seconds in times["seconds"].items():
+        colour, marker = LOOKS[name.partition(",")[0]]
+        look = {"color": colour, "marker": marker, "label": name}
+        if name.endswith("one core"):
+            look |= {"ls": "--", "mfc": "white"}
+        ax.loglog(x, np.array(seconds) / unit, **look)
+    # All of a few sizes, every second of many.
+    step = 1 if len(x) < 5 else 2
+    ticks = x[::step]
+    style.set_named_ticks(ax, ticks, [f"{size:,.0f}" for size in ticks])
+    style.draw_grid(ax)
 
 
 if __name__ == "__main__":

@@ -1,30 +1,34 @@
-"""Plates and bars in beds of grains: stress by tilt on their leading faces, and where the
-map of plates pulls.
+"""Plates and bars in beds of grains: stress by tilt on their leading faces, and the
+tilts at which the map of plates pulls.
 
-Resistive force theory takes the stress on a part of a bar for the stress on a plate of the
-same tilt at the same depth (Fig. 8(a)), and the map of plates pulls on faces that look up
-by more than 53 degrees. The beds are those of `figures.grains.beds`; bars and plates are towed
-level at 0.1 m/s, 16 mm deep. Stress is divided by the depth of each part, signs are as in
-`figures.paper.fig08a_rods`; errors are standard errors over three beds (two of the shell).
+Resistive force theory takes the stress on a part of a bar to be that on a plate of the
+same tilt at the same depth (Fig. 8(a)), and the map of plates pulls on faces that look
+up by more than 53 degrees. The beds are those of `figures.grains.beds`; bars and plates
+are towed level at 0.1 m/s, 16 mm deep. Stress is divided by the depth of each part,
+with the signs of `figures.paper.fig08a_rods`; errors are standard errors over three
+beds (two for the shell).
 
-Left and middle: normal and tangential stress on the rows of spheres of a round bar, and on
-the middle of the leading face of plates, without half a grain at the edges; open: on whole
-plates, with edges and rear faces. The map has the zeta that fits the middle of the plates
-best where it pushes, and is dashed where it pulls. Right: lift over drag on the leading
-curved faces of three bars, of plates that are summed over them, by the map over them, and
-on whole bars; and of a thin half shell whose hollow leads.
+Left and middle: normal and tangential stress on the rows of spheres of a round bar, and
+on the middle of the leading face of plates, without half a grain at the edges; open: on
+whole plates, with edges and rear faces. The map has the zeta that fits the middle of
+the plates best where it pushes, and is dashed where it pulls. Right: lift over drag on
+the leading curved faces of three bars, of plates summed over these faces, by the map
+over them, and on whole bars; and on a thin half shell whose hollow leads.
 
-The data are in `figures/grains/campaigns`; the commands that computed them are in the files.
+The data are in `figures/grains/campaigns`; each file names the command that computed
+it.
 """
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from figures import main, style
-from figures.grains.beds import over_beds
+from figures.grains.beds import bed_mean, mean_and_error
 from figures.grains.campaigns import grains
-from figures.paper.fig08a_rods import on_face
+from figures.paper.fig08a_rods import face_stress
 from geomech import plots
 from rft.terradynamics.plates import Polygon, StressMap, loads
 
@@ -46,12 +50,12 @@ DOTS = {"ls": "none", "ms": 4, "capsize": 2}
 def compute() -> dict:
     """Return measured stresses, and lift over drag.
 
-    "plates": by height, m, {"beta": (P,), rad, and by part, "face", "rear" and "whole", by
-    component, "normal" and "tangent": (P, beds), N/cm^3}. "bar": {"beta": (R,), "normal",
-    "tangent": (R, beds)} of the leading rows of the round bar. "maps": by rule {"zeta",
-    "normal", "tangent": at `BETA`, N/cm^3, "misfit": rms difference from the net stress on
-    plates and from the bar, each over its rms}. "bars": by name {"faces", "whole",
-    "plates": (mean, error), "keep", "cut"}, lift over drag.
+    "plates": by height, m, {"beta": (P,), rad, and by part, "face", "rear" and "whole",
+    by component, "normal" and "tangent": (P, beds), N/cm^3}. "bar": {"beta": (R,),
+    "normal", "tangent": (R, beds)} of the leading rows of the round bar. "maps": by
+    rule {"zeta", "normal", "tangent": at `BETA`, N/cm^3, "misfit": rms difference from
+    the net stress on plates and from the bar, each over its rms}. "bars": by name
+    {"faces", "whole", "plates": (mean, error), "keep", "cut"}, lift over drag.
     """
     plates = {height: measured_plates(height, len(b)) for height, b in grains.PLATES}
     main_plates = plates[grains.PLATES[0][0]]
@@ -80,8 +84,8 @@ def measured_plates(height: float, tilts: int) -> dict:
 
 
 def leading_rows(name: str) -> dict:
-    """Return the rows of spheres on the curved leading face of a bar, without corners and
-    flat sides.
+    """Return the rows of spheres on the curved leading face of a bar, without corners
+    and flat sides.
 
     {"beta", "weight": (R,), tilt, rad, and depth times area, m^3, "drag", "lift": (R,
     beds), N, "normal", "tangent": (R, beds), stress over depth, N/cm^3}. Half of a row
@@ -127,14 +131,14 @@ def leading_rows(name: str) -> dict:
 
 
 def fitted_maps(plates: dict, bar: dict) -> dict:
-    """Return the map by rule, with the zeta that fits the net stress on plates best where
-    it pushes, and its misfits."""
+    """Return the map by rule, with the zeta that fits the net stress on plates best
+    where it pushes, and its misfits."""
     net = [plates["face"][c] + plates["rear"][c] for c in COMPONENTS]
     on_plates = np.concatenate([x.mean(1) for x in net])
     on_bar = np.concatenate([bar[c].mean(1) for c in COMPONENTS])
     unit = {}
     for rule in RULES:
-        unit[rule] = dict(zip(COMPONENTS, on_face(StressMap(tension=rule), BETA)))
+        unit[rule] = dict(zip(COMPONENTS, face_stress(StressMap(tension=rule), BETA)))
     x = map_stress(unit["cut"], plates["beta"])
     zeta = float(x @ on_plates / (x @ x))
     maps = {}
@@ -149,7 +153,8 @@ def fitted_maps(plates: dict, bar: dict) -> dict:
 
 
 def map_stress(stress: dict, beta: np.ndarray) -> np.ndarray:
-    """Return normal and tangential stress of a map at tilts (B,), one after the other."""
+    """Return normal and tangential stress of a map at tilts (B,), one after the
+    other."""
     return np.concatenate([np.interp(beta, BETA, stress[c]) for c in COMPONENTS])
 
 
@@ -162,7 +167,8 @@ def relative_rms(values: np.ndarray, by_map: np.ndarray) -> float:
 
 
 def lift_over_drag(rows: dict, beta, normal, tangent) -> float:
-    """Return lift over drag of stress over depth, (B,) at tilts beta, on rows of a bar."""
+    """Return lift over drag by stress over depth (B,) at tilts beta, on rows of a
+    bar."""
     sin = np.sin(rows["beta"])
     cos = np.cos(rows["beta"])
     sigma = rows["weight"] * np.interp(rows["beta"], beta, normal)
@@ -177,14 +183,14 @@ def bar_lifts(name: str, rows: dict, plates: dict, maps: dict) -> dict:
     is_bar = data["shape"] == name
     beds = data["bed"][is_bar]
     face = plates["face"]
-    of_plates = [
+    plate_lifts = [
         lift_over_drag(rows, plates["beta"], normal, tangent)
         for normal, tangent in zip(face["normal"].T, face["tangent"].T)
     ]
     lifts = {
-        "faces": over_beds(rows["lift"].sum(0) / rows["drag"].sum(0), beds),
-        "whole": over_beds(data["lift_over_drag"][is_bar], beds),
-        "plates": over_beds(np.array(of_plates), beds),
+        "faces": bed_mean(rows["lift"].sum(0) / rows["drag"].sum(0), beds),
+        "whole": bed_mean(data["lift_over_drag"][is_bar], beds),
+        "plates": bed_mean(np.array(plate_lifts), beds),
     }
     for rule, stress in maps.items():
         lifts[rule] = lift_over_drag(rows, BETA, stress["normal"], stress["tangent"])
@@ -192,8 +198,8 @@ def bar_lifts(name: str, rows: dict, plates: dict, maps: dict) -> dict:
 
 
 def shell_lifts() -> dict:
-    """Return lift over drag of half a round tube whose hollow leads, in grains and by the
-    map, which sums over both sides."""
+    """Return lift over drag of half a round tube whose hollow leads, in grains and by
+    the map, which sums over both sides."""
     data = grains.read("faces")
     is_shell = data["shape"] == grains.SHELL
     beds = np.unique(data["bed"][is_shell])
@@ -204,16 +210,15 @@ def shell_lifts() -> dict:
     sheet = Polygon(tuple(arc), grains.TROUGH.length, closed=False).outline(400)
     pose = [0, -grains.BAR_DEPTH, 0]
     velocity = [grains.SPEED, 0, 0]
-    lifts = {"whole": over_beds(lift / drag, beds), "faces": UNKNOWN, "plates": UNKNOWN}
+    lifts = {
+        "whole": bed_mean(lift / drag, beds),
+        "faces": UNKNOWN,
+        "plates": UNKNOWN,
+    }
     for rule in RULES:
         force = loads(StressMap(tension=rule), sheet, pose, velocity).force
         lifts[rule] = float(-force[1] / force[0])
     return lifts
-
-
-def mean_and_error(values: np.ndarray) -> tuple:
-    """Return the mean over beds (..., beds) and its standard error."""
-    return values.mean(-1), values.std(-1, ddof=1) / np.sqrt(values.shape[-1])
 
 
 # Tables
@@ -222,7 +227,7 @@ def mean_and_error(values: np.ndarray) -> tuple:
 def table(numbers: dict) -> str:
     """Return stress on plates of two heights, lift over drag of bars, and the maps'
     misfits."""
-    columns = [(part, c) for part in PARTS for c in COMPONENTS]
+    columns = list(itertools.product(PARTS, COMPONENTS))
     rows = []
     for height, plates in numbers["plates"].items():
         for k, beta in enumerate(np.degrees(plates["beta"])):
@@ -292,7 +297,7 @@ def draw_stress(ax, numbers: dict, component: str, name: str) -> None:
         ax.errorbar(x, y, error, label=f"plates of {size}", **look)
         y, error = mean_and_error(1e3 * plates["whole"][component])
         ax.errorbar(x, y, error, mfc="white", label=f"{size}, with edges", **look)
-    style.zero_line(ax)
+    style.draw_zero_line(ax)
     ax.set(xlabel="tilt of the face (degrees)", xlim=(0, 180))
     ticks = ["0\nunderside", 45, "90\nfront", 135, "180\ntop"]
     ax.set_xticks(range(0, 181, 45), ticks)

@@ -70,7 +70,7 @@ def draw(numbers: dict):
         ylim=(0, None),
     )
     ax.set_xticks(range(0, 91, 15))
-    style.legend_right(ax, title="solid, filled: across\ndashed, open: along")
+    style.draw_legend_right(ax, title="solid, filled: across\ndashed, open: along")
     return fig
 
 

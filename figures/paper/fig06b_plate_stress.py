@@ -83,10 +83,10 @@ def draw(numbers: dict):
             if gamma < 0:
                 label += ", on the way up"
                 dashes = "--"
-            look = style.sparse(k, len(depth))
+            look = style.curve_look(k, len(depth))
             sigma = 1e-3 * plate[f"sigma_{name}"]
             ax.plot(depth, sigma, ls=dashes, label=label, **look)
-        style.zero_line(ax)
+        style.draw_zero_line(ax)
         ax.set(
             xlabel="depth |z| of the plate's middle (cm)",
             ylabel=rf"{stress} $\sigma_{name}$ (kPa)",
@@ -95,7 +95,7 @@ def draw(numbers: dict):
     left = axes[0, 0]
     x = 1e2 * numbers["under"] + 0.1
     left.text(x, left.get_ylim()[1], "all plates under", va="top", **style.NOTE)
-    style.legend_right(axes[0, 1], title="tilt, direction (degrees)")
+    style.draw_legend_right(axes[0, 1], title="tilt, direction (degrees)")
     return fig
 
 

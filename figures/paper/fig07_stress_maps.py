@@ -28,8 +28,8 @@ def compute(cells: int = 180) -> dict:
     """Return the nine coefficients and the survey of the generic map.
 
     "names" and "generic": (9,) of M0, N/cm^3. "media": {name: {"zeta", "coefficients"
-    (9,), "off"}}, the coefficients over zeta, and the rms of their difference from M0
-    over the rms of M0. "survey": of M0.
+    (9,), "difference"}}, the coefficients over zeta, and the rms of their difference
+    from M0 over the rms of M0. "survey": of M0.
     """
     generic = coefficients("generic")
     media = {}
@@ -40,7 +40,7 @@ def compute(cells: int = 180) -> dict:
         media[name] = {
             "zeta": zeta,
             "coefficients": scaled,
-            "off": float(np.sqrt(ratio)),
+            "difference": float(np.sqrt(ratio)),
         }
     return {
         "names": COEFFICIENTS,
@@ -135,7 +135,7 @@ def draw_angle(ax, centre, start: float, stop: float, radius: float, label: str)
 def draw_coefficients(ax, numbers: dict) -> None:
     """Draw the coefficients of the media over their strength, and the generic set."""
     places = np.arange(len(numbers["names"]))
-    style.zero_line(ax)
+    style.draw_zero_line(ax)
     line = {"color": style.BLACK, "lw": 1.5, "marker": "*", "ms": 8}
     ax.plot(places, numbers["generic"], label="generic, $M_0$", **line)
     looks = zip((style.LOOSE, style.CLOSE), "os")

@@ -1,28 +1,28 @@
 """Fig. 10: muscle activation of a swimming sandfish, predicted by the internal moment
-that holds against the sand.
+against the resistance of the sand.
 
-The sign of the moment is taken for the side that works, as in Sec. III C
-(`geomech.studies.mechanics.undulation.activation`), for a plain body at the animal's amplitude in
-loose glass; dashed in (d), with the sandfish's head drag.
+The sign of the moment tells the side that works, as in Sec. III C
+(`geomech.studies.mechanics.undulation.activation`). Lines are for a plain body at the
+animal's amplitude in loose glass; dashed in (d), with the sandfish's head drag.
 
 (a) As Fig. 10(c): lines where the right side starts and stops to work, over the shaded
 part of the cycle in which curvature to the left falls. (b) As Fig. 10(b): curvature and
 moment at one place. The caption's place is x = 0.71 pi, from an origin it does not
 name; ours is 70 % of the way from head to tail. There the right side starts before the
 body is bent most to the left. (c) Phase by which activation is ahead of curvature: pi /
-2 where the side that works is the one that shortens, as at the middle of a body that is
-alike fore and aft; more towards the tail, the advance that Sec. III C speaks of. (d)
-Speed of the wave of activation over that of curvature.
+2 where the side that works is the one that shortens, as at the middle of a body with
+equal halves fore and aft; more towards the tail, the advance that Sec. III C speaks of.
+(d) Speed of the wave of activation over that of curvature.
 
 The ratio is above 1: the wave of activation is the faster one, as Sec. III C says of
 nearly all undulating animals. The same section later calls its phase speed the smaller
-one, as an inverse of a slope; what is smaller here is the slope of the lines in (a),
-time over place, not its inverse. From 0.5 to 1.8 waves the ratio falls, but not evenly:
-between 1 and 1.4 waves it is level to 5 % by the lines of onset and offset, with a
-shallow dip, and rises by 10 % by the first harmonic. As the lines are not straight the
-ratio depends on the share of the body they are fitted over: from 0.2 to 0.8 of it
-instead of 0.1 to 0.9 it is lower by up to 0.3, with the same dip. The comparison with
-electromyography needs the animals' data and is not made.
+one, taking it for the inverse of a slope; the smaller quantity here is the slope of the
+lines in (a), time over place, not its inverse. From 0.5 to 1.8 waves the ratio falls,
+but not evenly: between 1 and 1.4 waves it is level to 5 % by the lines of onset and
+offset, with a shallow dip, and rises by 10 % by the first harmonic. As the lines are
+not straight, the ratio depends on the share of the body they are fitted over: from 0.2
+to 0.8 of it instead of 0.1 to 0.9 it is lower by up to 0.3, with the same dip. A
+comparison with electromyography would need the animals' data.
 """
 
 from __future__ import annotations
@@ -40,6 +40,7 @@ WAVES = np.linspace(0.5, 1.8, 27)
 SELECTED = (0.5, 0.75, 1.0, 1.25, 1.5, 1.8)  # of the lags and the table
 PLACE = 0.3  # of the trace in time: 70 % of the way from head to tail
 PLACES = (0.25, 0.5, 0.75)  # of the table
+BOUNDS = (("onset", "-"), ("offset", "--"))  # of the work of the right side
 
 
 def compute(waves=WAVES, elements: int = 100, phases: int = 128) -> dict:
@@ -53,37 +54,39 @@ def compute(waves=WAVES, elements: int = 100, phases: int = 128) -> dict:
     """
     fish = load("sandfish-loose").with_numerics(phases=phases)
 
-    def run(count, effects=()):
-        gait = Sine(waves=count, amplitude=fish.gait.amplitude, elements=elements)
+    def activation(n_waves, effects):
+        gait = Sine(waves=n_waves, amplitude=fish.gait.amplitude, elements=elements)
+        body = Backbone(elements)
         return undulation.activation(
-            fish.changed(body=Backbone(elements), effects=effects, gait=gait)
+            fish.changed(body=body, effects=effects, gait=gait)
         )
 
-    keys = {
-        "lag": "lag",
-        "speed": "speed_ratio",
-        "fundamental_speed": "fundamental_speed_ratio",
-    }
-    headless, head = (
-        [run(w, effects) for w in waves] for effects in ((), fish.system.effects)
-    )
-    headless, head = (
-        {k: np.array([r[old] for r in runs]) for k, old in keys.items()}
-        for runs in (headless, head)
-    )
-    one = run(1.0)
+    headless = [activation(n, ()) for n in waves]
+    head = [activation(n, fish.system.effects) for n in waves]
+    one = activation(1.0, ())
     return {
         "waves": np.array(waves),
         "s": one["s"],
-        **headless,
+        **wave_measures(headless),
         "one": one,
-        "head": head,
+        "head": wave_measures(head),
     }
 
 
-def selected(numbers: dict) -> list[int]:
+def wave_measures(activations: list[dict]) -> dict:
+    """Return "lag" (W, S), "speed" and "fundamental_speed" (W,) of activations."""
+    return {
+        "lag": np.array([x["lag"] for x in activations]),
+        "speed": np.array([x["speed_ratio"] for x in activations]),
+        "fundamental_speed": np.array(
+            [x["fundamental_speed_ratio"] for x in activations]
+        ),
+    }
+
+
+def selected_rows(numbers: dict) -> list[int]:
     """Return the rows of the waves in SELECTED."""
-    return [k for k, w in enumerate(numbers["waves"]) if np.isclose(w, SELECTED).any()]
+    return [k for k, n in enumerate(numbers["waves"]) if np.isclose(n, SELECTED).any()]
 
 
 def table(numbers: dict) -> str:
@@ -103,12 +106,15 @@ def table(numbers: dict) -> str:
         numbers["head"]["speed"],
     )
     lags = np.array([np.interp(PLACES, numbers["s"], lag) for lag in numbers["lag"]])
-    rows = np.column_stack([*columns, lags])[selected(numbers)]
-    return style.table(heads, [[f"{x:.2f}" for x in row] for row in rows])
+    rows = []
+    for row in np.column_stack([*columns, lags])[selected_rows(numbers)]:
+        rows.append([f"{x:.2f}" for x in row])
+    return style.table(heads, rows)
 
 
 @plots.styled
 def draw(numbers: dict):
+    """Draw the map of activation, the trace at a place, lags and speeds."""
     fig, axes = plots.figure(6.7, 5.6, 2, 2)
     draw_map(axes[0, 0], numbers["one"])
     draw_trace(axes[0, 1], numbers["one"])
@@ -118,31 +124,26 @@ def draw(numbers: dict):
     return fig
 
 
-def draw_map(ax, one: dict):
+def draw_map(ax, one: dict) -> None:
+    """Draw onset and offset along the body over the part of the cycle in which
+    curvature falls."""
     s = one["s"]
     t = np.append(one["t"], 2 * np.pi)
     rate = np.concatenate([one["bend_rate"], one["bend_rate"][:1]])
     ax.contourf(s, t, rate, levels=[-np.inf, 0.0], colors=[style.SHADED["color"]])
-    for key, dashes in (("onset", "-"), ("offset", "--")):
-        for turn in (
-            -2 * np.pi,
-            0.0,
-            2 * np.pi,
-        ):  # the lines leave the cycle and come back into it
-            ax.plot(
-                s,
-                one[key] + turn,
-                color=style.GREEN,
-                ls=dashes,
-                label=f"{key} of right side" if turn == 0 else None,
-            )
+    for key, dashes in BOUNDS:
+        look = {"color": style.GREEN, "ls": dashes}
+        # The lines leave the cycle and come back into it.
+        ax.plot(s, one[key] - 2 * np.pi, **look)
+        ax.plot(s, one[key], label=f"{key} of right side", **look)
+        ax.plot(s, one[key] + 2 * np.pi, **look)
     ax.fill([], [], label="bending to the right", **style.SHADED)
     ax.set(xlabel="place on the body, tail 0 to head 1", xlim=(0, 1))
-    style.phase_axis(ax, "y")
+    style.set_phase_axis(ax, "y")
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0))
 
 
-def draw_trace(ax, one: dict):
+def draw_trace(ax, one: dict) -> None:
     """Draw curvature and moment over a cycle at PLACE, each over its largest value, and
     the span in which the right works."""
     k = np.abs(one["s"] - PLACE).argmin()
@@ -155,26 +156,23 @@ def draw_trace(ax, one: dict):
         trace = np.append(one[key][:, k], one[key][0, k])
         ax.plot(t, trace / np.abs(trace).max(), color=colour, lw=width, label=label)
     falls = np.append(one["bend_rate"][:, k], one["bend_rate"][0, k]) < 0
-    ax.fill_between(
-        t, -1.1, 1.1, where=falls, label="bending to the right", **style.SHADED
-    )
-    for key, dashes in (("onset", "-"), ("offset", "--")):
-        ax.axvline(np.mod(one[key][k], 2 * np.pi), color=style.GREEN, ls=dashes, lw=1.0)
-    style.zero_line(ax)
+    shade = {"label": "bending to the right", **style.SHADED}
+    ax.fill_between(t, -1.1, 1.1, where=falls, **shade)
+    for key, dashes in BOUNDS:
+        phase = np.mod(one[key][k], 2 * np.pi)
+        ax.axvline(phase, color=style.GREEN, ls=dashes, lw=1.0)
+    style.draw_zero_line(ax)
     ax.set(ylabel=f"over its largest value, at s = {PLACE}", ylim=(-1.1, 1.1))
-    style.phase_axis(ax)
+    style.set_phase_axis(ax)
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0))
 
 
-def draw_lag(ax, numbers: dict):
-    rows = selected(numbers)
+def draw_lag(ax, numbers: dict) -> None:
+    """Draw the phase by which activation is ahead, along the body."""
+    rows = selected_rows(numbers)
     for k, colour in zip(rows, style.shades(len(rows))):
-        ax.plot(
-            numbers["s"],
-            numbers["lag"][k],
-            color=colour,
-            label=f"{numbers['waves'][k]:g}",
-        )
+        label = f"{numbers['waves'][k]:g}"
+        ax.plot(numbers["s"], numbers["lag"][k], color=colour, label=label)
     ax.axhline(np.pi / 2, **style.GUIDE)
     ax.text(0.02, np.pi / 2 - 0.08, "works while\nit shortens", va="top", **style.NOTE)
     ax.set(
@@ -182,11 +180,12 @@ def draw_lag(ax, numbers: dict):
         ylabel="activation ahead of curvature (rad)",
         xlim=(0, 1),
     )
-    style.quarter_ticks(ax, "y", 4)
+    style.set_quarter_ticks(ax, "y", 4)
     ax.legend(title="waves on the body", loc="upper right", ncols=2)
 
 
-def draw_speed(ax, numbers: dict):
+def draw_speed(ax, numbers: dict) -> None:
+    """Draw the ratio of speeds against the number of waves."""
     waves = numbers["waves"]
     head = numbers["head"]
     looks = (
@@ -197,7 +196,7 @@ def draw_speed(ax, numbers: dict):
         look = {"color": colour, "marker": marker, "markevery": 4}
         ax.plot(waves, numbers[key], label=label, **look)
         ax.plot(waves, head[key], ls="--", lw=1.0, **look)
-    style.entry(ax, "with head drag", ls="--", lw=1.0)
+    style.add_entry(ax, "with head drag", ls="--", lw=1.0)
     ax.axhline(1.0, **style.GUIDE)
     ax.set(
         xlabel="waves on the body",

@@ -1,8 +1,9 @@
-"""The sensitivity of the speeds of walking robots: every size that the paper does not
-give, one at a time, times 0.7 and 1.4, and two choices of the model: whether grains
-pull on faces, as their map has it, and whether the belly is a closed box, whose bottom
-and front feel grains where they lead, or an open sheet, its bottom alone, which feels
-them on either side.
+"""The sensitivity of the speeds of walking robots to assumptions: every size that the
+paper does not give, one at a time, times 0.7 and 1.4, and two choices of the model.
+
+The choices are whether grains pull on faces, as in their map, and whether the belly is
+a closed box, on whose bottom and front grains push where these lead, or an open sheet,
+its bottom alone, on either side of which grains push.
 
 Above, the mean speed of Xplorer with c-legs, flat and reversed ones at 2 Hz; below,
 that of SandBot at 4 rad/s in still grains and with air at 0.6 of fluidisation.
@@ -25,14 +26,23 @@ from rft.terradynamics.walking import Rhex
 
 FACTORS = (0.7, 1.0, 1.4)
 NAMES = {
-    "robot.legs.radius": "leg radius", "robot.legs.width": "leg width", "robot.height": "body height",
-    "robot.width": "body width", "robot.hips": "hip spacing", "robot.inertia": "inertia", "medium.zeta": "ground strength",
-    "gait.duty": "share of stance", "medium.tension": "faces that pull", "belly": "belly",
-}  # fmt: skip
-CHOICES = {
-    "medium.tension": ("keep", "cut"),
-    "belly": ("box", "sheet"),
-}  # as the scenes have it, and else
+    "robot.legs.radius": "leg radius",
+    "robot.legs.width": "leg width",
+    "robot.height": "body height",
+    "robot.width": "body width",
+    "robot.hips": "hip spacing",
+    "robot.inertia": "inertia",
+    "medium.zeta": "ground strength",
+    "gait.duty": "share of stance",
+    "medium.tension": "faces that pull",
+    "belly": "belly",
+}
+# of the built-in scenes, and the other
+CHOICES = {"medium.tension": ("keep", "cut"), "belly": ("box", "sheet")}
+CURVATURES = {"c-leg": 1.0, "flat": 0.0, "reversed": -1.0}  # of Xplorer's legs
+AIR_SPEEDS = {"still": 0.0, "0.6 of fluidisation": 0.6}  # over that of fluidisation
+FLUIDISATION = 0.25  # m/s
+BATCH = 32  # robots
 
 
 class Sheet(Rhex):
@@ -44,149 +54,148 @@ class Sheet(Rhex):
         return Polygon(((-x, z), (x, z)), self.width, closed=False).outline(elements)
 
 
-def varied(scene, name: str, factor: float | str):
+def with_change(scene, name: str, value: float | str):
     """Return the scene with one of its assumed sizes times a factor, or with another
     choice."""
     if name == "belly":
-        return (
-            scene
-            if factor == "box"
-            else dataclasses.replace(scene, robot=Sheet(**vars(scene.robot)))
-        )
+        if value == "box":
+            return scene
+        return dataclasses.replace(scene, robot=Sheet(**vars(scene.robot)))
     if name == "robot.legs.radius" and scene.robot.axle:
-        scene = changed(scene, "robot.axle", factor)
-    return changed(scene, name, factor)
+        scene = with_field(scene, "robot.axle", value)
+    return with_field(scene, name, value)
 
 
-def changed(part, name: str, factor: float | str):
+def with_field(part, name: str, value: float | str):
     """Return a dataclass with a field, or a field of a field, times a factor, or
     replaced by a choice."""
     first, _, rest = name.partition(".")
-    value = getattr(part, first)
+    current = getattr(part, first)
     if rest:
-        value = changed(value, rest, factor)
-    elif isinstance(factor, str):
-        value = factor
+        changed = with_field(current, rest, value)
+    elif isinstance(value, str):
+        changed = value
+    elif isinstance(current, tuple):
+        changed = tuple(np.multiply(current, value))
     else:
-        value = (
-            tuple(np.multiply(value, factor))
-            if isinstance(value, tuple)
-            else value * factor
-        )
-    return dataclasses.replace(part, **{first: value})
+        changed = current * value
+    return dataclasses.replace(part, **{first: changed})
 
 
 def compute(factors=FACTORS, names=NAMES) -> dict:
     """Return {robot: {curve: {name: [(factor or choice, speed, estimate,
     status)]}}}."""
+    numbers: dict = {}
+    for robot, scenes in curve_scenes().items():
+        cases = []
+        for curve in scenes:
+            for name in names:
+                for value in CHOICES.get(name, factors):
+                    cases.append((curve, name, value))
+        changed = [with_change(scenes[curve], name, x) for curve, name, x in cases]
+
+        numbers[robot] = {curve: {name: [] for name in names} for curve in scenes}
+        for (curve, name, value), result in zip(cases, walks(changed)):
+            row = (value, result.walk.speed, result.estimate, result.walk.status)
+            numbers[robot][curve][name].append(row)
+    return numbers
+
+
+def curve_scenes() -> dict:
+    """Return {robot: {curve: scene}}: Xplorer by its legs, SandBot by the air."""
     xplorer = load("xplorer")
+    xplorers = {}
+    for name, curvature in CURVATURES.items():
+        legs = dataclasses.replace(xplorer.robot.legs, relative_curvature=curvature)
+        robot = dataclasses.replace(xplorer.robot, legs=legs)
+        xplorers[name] = dataclasses.replace(xplorer, robot=robot)
     sandbot = load("sandbot")
-    legs = lambda c: dataclasses.replace(xplorer.robot.legs, relative_curvature=c)
-    curves = {
-        "Xplorer": {
-            name: dataclasses.replace(
-                xplorer, robot=dataclasses.replace(xplorer.robot, legs=legs(c))
-            )
-            for name, c in (("c-leg", 1.0), ("flat", 0.0), ("reversed", -1.0))
-        },
-        "SandBot": {
-            name: dataclasses.replace(sandbot, effects=(Aeration(share * 0.25, 0.25),))
-            for name, share in (("still", 0.0), ("0.6 of fluidisation", 0.6))
-        },
-    }
-    out: dict = {}
-    for robot, scenes_of in curves.items():
-        jobs = [
-            (curve, name, f)
-            for curve in scenes_of
-            for name in names
-            for f in CHOICES.get(name, factors)
-        ]
-        scenes = [varied(scenes_of[curve], name, f) for curve, name, f in jobs]
-        found = [
-            w
-            for k in range(0, len(scenes), 32)
-            for w in walking.walked(scenes[k : k + 32], settling=True)
-        ]
-        for (curve, name, f), one in zip(jobs, found):
-            row = (f, one.walk.speed, one.estimate, one.walk.status)
-            out.setdefault(robot, {}).setdefault(curve, {}).setdefault(name, []).append(
-                row
-            )
-    return out
+    sandbots = {}
+    for name, share in AIR_SPEEDS.items():
+        air = Aeration(share * FLUIDISATION, FLUIDISATION)
+        sandbots[name] = dataclasses.replace(sandbot, effects=(air,))
+    return {"Xplorer": xplorers, "SandBot": sandbots}
+
+
+def walks(scenes: list) -> list:
+    """Return the walks of scenes with their estimates, batch by batch."""
+    results = []
+    for k in range(0, len(scenes), BATCH):
+        results += walking.walked(scenes[k : k + BATCH], settling=True)
+    return results
 
 
 def table(numbers: dict) -> str:
-    """Return by how many per cent each assumption moves each speed: the smaller size
-    and the larger, or the other choice."""
-    curves = [found for by_curve in numbers.values() for found in by_curve.values()]
-    rows = [
-        "| assumed | "
-        + " | ".join(
-            f"{robot}: {curve}"
-            for robot, by_curve in numbers.items()
-            for curve in by_curve
-        )
-        + " |"
-    ]
-    rows.append("|---|" + "---|" * len(curves))
-    for name in curves[0]:
-        cells = []
-        for found in curves:
-            as_is = CHOICES.get(name, (1.0,))[0]
-            (unchanged,) = [speed for value, speed, *_ in found[name] if value == as_is]
-            others = [
-                speed / unchanged - 1
-                for value, speed, *_ in found[name]
-                if value != as_is
-            ]
-            cells.append(", ".join(f"{100 * x:+.0f}" for x in others))
-        rows.append(f"| {NAMES[name]} | " + " | ".join(cells) + " |")
-    return "\n".join(rows)
+    """Return by how many per cent each assumption changes each speed, as Markdown: the
+    smaller size and the larger, or the other choice."""
+    heads = ["assumed"]
+    columns = []
+    for robot, curves in numbers.items():
+        for curve, by_name in curves.items():
+            heads.append(f"{robot}: {curve}")
+            columns.append(by_name)
+    lines = [markdown_row(heads), "|" + "---|" * len(heads)]
+    for name in columns[0]:
+        changes = [percent_changes(name, by_name[name]) for by_name in columns]
+        lines.append(markdown_row([NAMES[name], *changes]))
+    return "\n".join(lines)
+
+
+def markdown_row(cells: list[str]) -> str:
+    """Return a row of a table in Markdown."""
+    return f"| {' | '.join(cells)} |"
+
+
+def percent_changes(name: str, rows: list[tuple]) -> str:
+    """Return the changes of the speed by an assumption from the built-in scene."""
+    built_in = 1.0
+    if name in CHOICES:
+        built_in = CHOICES[name][0]
+    speeds = {value: speed for value, speed, *_ in rows}
+    reference = speeds.pop(built_in)
+    changes = [speed / reference - 1 for speed in speeds.values()]
+    return ", ".join(f"{100 * change:+.0f}" for change in changes)
 
 
 @plots.styled
 def draw(numbers: dict):
-    sizes = next(iter(next(iter(numbers.values())).values()))
-    fig, axes = plots.figure(1.2 * len(sizes), 4.8, len(sizes), len(numbers))
+    """Draw a row for each robot and a column for each assumption."""
+    first_robot = next(iter(numbers.values()))
+    names = list(next(iter(first_robot.values())))
+    fig, axes = plots.figure(1.2 * len(names), 4.8, len(names), len(numbers))
     for row, (robot, curves) in zip(axes, numbers.items()):
-        for ax, name in zip(row, sizes):
-            for curve, colour, marker, dashes in zip(
-                curves, style.SEQUENCE, style.MARKERS, ("-", "--", ":")
-            ):
-                f, speed, error, status = zip(*curves[curve][name])
-                f = (1.0, 2.0) if name in CHOICES else f  # side by side
-                ax.errorbar(
-                    f,
-                    speed,
-                    yerr=error,
-                    color=colour,
-                    ls=dashes,
-                    lw=1.0,
-                    capsize=2,
-                    label=curve,
-                )
-                for x, y, kind in zip(f, speed, status):
-                    ax.plot(
-                        x,
-                        y,
-                        marker,
-                        ms=4,
-                        color=colour,
-                        mfc=colour if kind == "walking" else "white",
-                    )
-            ax.set(xscale="log", xlabel="", ylim=(min(0.0, ax.get_ylim()[0]), None))
-            style.named_ticks(ax, f, CHOICES.get(name) or [f"{x:g}" for x in f])
-            if name in CHOICES:
-                ax.set_xlim(0.75, 2.7)
-            ax.set_title(NAMES[name], fontsize=7.5)
+        for ax, name in zip(row, names):
+            draw_assumption(ax, name, curves)
             ax.sharey(row[0])
         for ax in row[1:]:
             ax.tick_params(labelleft=False)
         row[0].set_ylabel(f"{robot}: speed (m/s)")
-        style.legend_right(row[-1])
+        style.draw_legend_right(row[-1])
     fig.supxlabel("times the size that is assumed; open: not walking", fontsize=9)
     return fig
+
+
+def draw_assumption(ax, name: str, curves: dict) -> None:
+    """Draw speeds against the values of one assumption."""
+    looks = zip(style.SEQUENCE, style.MARKERS, ("-", "--", ":"))
+    for (curve, by_name), (colour, marker, dashes) in zip(curves.items(), looks):
+        values, speeds, errors, statuses = zip(*by_name[name])
+        if name in CHOICES:
+            x = (1.0, 2.0)
+            labels = values
+        else:
+            x = values
+            labels = [f"{factor:g}" for factor in values]
+        look = {"color": colour, "ls": dashes, "lw": 1.0, "capsize": 2}
+        ax.errorbar(x, speeds, yerr=errors, label=curve, **look)
+        for place, speed, status in zip(x, speeds, statuses):
+            face = colour if status == "walking" else "white"
+            ax.plot(place, speed, marker, ms=4, color=colour, mfc=face)
+    ax.set(xscale="log", xlabel="", ylim=(min(0.0, ax.get_ylim()[0]), None))
+    style.set_named_ticks(ax, x, labels)
+    if name in CHOICES:
+        ax.set_xlim(0.75, 2.7)
+    ax.set_title(NAMES[name], fontsize=7.5)
 
 
 if __name__ == "__main__":

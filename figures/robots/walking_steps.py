@@ -1,10 +1,11 @@
 """The step-size study of the planar engine: Xplorer's progress from rest at 1 and 3 Hz
 by implicit and by explicit steps.
 
-The law of stress jumps at rest like dry friction and is rounded at a named speed.
-Explicit steps (Heun's, of order 2 as well) chatter across the jump until they resolve
-the rounding; implicit ones need not. Below, the residual of the balance of energy: work
-of the motors - loss in the ground - change of the body's energy.
+The law of stress jumps at rest like dry friction, and the numerics round it at a set
+speed. Explicit steps (Heun's, also of order 2) chatter across the jump until they
+resolve the rounding; implicit ones need not resolve it. Below, the residual of the
+balance of energy: work of the motors - loss in the ground - change of the body's
+energy.
 """
 
 from __future__ import annotations
@@ -24,81 +25,97 @@ STEPS = {
     "explicit": (96, 192, 384, 768, 1536, 3072),
 }
 FINEST = 1536
-FREQUENCIES = (1.0, 3.0)
+FREQUENCIES = (1.0, 3.0)  # Hz
+CYCLES = 1.5  # from rest
+FARTHEST = 10.0  # m, from which on a robot counts as thrown off
 
 
-def heun(robots, state: State, phase: float, of: float, dt: float) -> State:
-    """Take one explicit step, of order 2, for comparison: no walk is computed so."""
+def heun(robots, state: State, phase: float, rate_phase: float, dt: float) -> State:
+    """Return the state after one explicit step of order 2, with the arguments of
+    `step`, for comparison: no walk is computed by it."""
 
-    def slope(at: State, where: float):
-        a, motors, ground = robots.accelerations(
-            at.pose[None], at.twist[None], *robots.leg_motion(np.array([where]), of)
+    def slope(state: State, phase: float) -> State:
+        angle, rate = robots.leg_motion(np.array([phase]), rate_phase)
+        acceleration, motor_power, ground_power = robots.accelerations(
+            state.pose[None], state.twist[None], angle, rate
         )
-        return State(at.twist, a[0], motors[0], ground[0], *np.zeros((3, 1)))
+        sums = np.zeros((3, 1))  # of unsolved steps: there are none
+        return State(
+            state.twist, acceleration[0], motor_power[0], ground_power[0], *sums
+        )
 
-    first = slope(state, phase)
-    then = State(*(x + dt * y for x, y in zip(state, first)))
-    second = slope(then, phase + dt * robots.frequency[0, 0])
-    return State(*(x + dt * (y + z) / 2 for x, y, z in zip(state, first, second)))
+    start_slope = slope(state, phase)
+    end = State(*(x + dt * dx for x, dx in zip(state, start_slope)))
+    end_slope = slope(end, phase + dt * robots.frequency[0, 0])
+    slopes = zip(state, start_slope, end_slope)
+    return State(*(x + dt * (dx + dy) / 2 for x, dx, dy in slopes))
 
 
-def progress(frequency: float, steps: int, how: str, cycles: float = 1.5):
-    """Return the progress, m, and the residual of the balance of energy over the work,
-    after some cycles from rest."""
+METHODS = {"implicit": step, "explicit": heun}
+
+
+def progress(
+    frequency: float, steps: int, method: str, cycles: float = CYCLES
+) -> tuple[float, float]:
+    """Return the distance, m, and the residual of the balance of energy over the work,
+    after some cycles from rest; both infinite for a robot that is thrown off."""
     scene = load("xplorer")
-    robots = _strides(
-        [Walker(scene.robot, Tripod(frequency), scene.medium)], scene.numerics
-    ).robots
-    state = first = robots.start()
-    count = round(cycles * steps)
-    for k in range(count):
+    walker = Walker(scene.robot, Tripod(frequency), scene.medium)
+    robots = _strides([walker], scene.numerics).robots
+    take_step = METHODS[method]
+    dt = 1 / (steps * frequency)
+    start = robots.start()
+    state = start
+    for k in range(round(cycles * steps)):
         phase = k / steps
-        dt = 1 / (steps * frequency)
-        if how == "implicit":
-            state = step(robots, state, phase, phase + 0.5 / steps, dt)
-        else:
-            state = heun(robots, state, phase, phase + 0.5 / steps, dt)
-        if not np.isfinite(state.pose).all() or np.abs(state.pose[0, :2]).max() > 10.0:
+        state = take_step(robots, state, phase, phase + 0.5 / steps, dt)
+        place = state.pose[0, :2]
+        if not np.isfinite(state.pose).all() or np.abs(place).max() > FARTHEST:
             return np.inf, np.inf
-    residual = state.work - state.loss - robots.energy(state) + robots.energy(first)
+    residual = state.work - state.loss - robots.energy(state) + robots.energy(start)
     return state.pose[0, 0], abs(residual[0] / state.work[0])
 
 
 def compute(steps=STEPS, finest: int = FINEST, frequencies=FREQUENCIES) -> dict:
-    """Return {frequency: {how: (steps, error of the progress over it, residual of the
-    energy's balance)}}."""
-    out = {}
-    for f in frequencies:
-        truth = progress(f, finest, "implicit")[0]
-        out[f] = {
-            how: (n, *np.array([progress(f, k, how) for k in n]).T)
-            for how, n in steps.items()
-        }
-        out[f] = {
-            how: (n, np.abs(x / truth - 1), residual)
-            for how, (n, x, residual) in out[f].items()
-        }
-    return out
+    """Return {frequency: {method: (steps, error of the distance over it, residual of
+    the energy's balance)}}."""
+    numbers: dict = {}
+    for frequency in frequencies:
+        reference, _ = progress(frequency, finest, "implicit")
+        numbers[frequency] = {}
+        for method, counts in steps.items():
+            runs = [progress(frequency, count, method) for count in counts]
+            distance, residual = np.array(runs).T
+            error = np.abs(distance / reference - 1)
+            numbers[frequency][method] = (counts, error, residual)
+    return numbers
 
 
 @plots.styled
 def draw(numbers: dict):
+    """Draw a column for each frequency: errors above, residuals below."""
     fig, axes = plots.figure(7.2, 4.8, len(numbers), 2)
-    for column, (f, lines) in zip(axes.T, numbers.items()):
-        for k, (ax, label) in enumerate(
-            zip(column, ("error of the progress", "energy not accounted for")), 1
-        ):
-            for (how, found), line, colour in zip(
-                lines.items(), ("o-", "s-"), (style.BLUE, style.VERMILION)
-            ):
-                values = np.where(np.isfinite(found[k]), found[k], np.nan)
-                ax.loglog(found[0], values, line, color=colour, lw=1.0, label=how)
-            style.order_line(ax, lines["implicit"][0], lines["implicit"][k], 2)
-            ax.set(xlabel="steps of a cycle", ylabel=label)
-            style.grid(ax)
-        column[0].set_title(f"{f:g} Hz")
-    style.legend_right(axes[0, -1])
+    for column, (frequency, methods) in zip(axes.T, numbers.items()):
+        error_ax, residual_ax = column
+        draw_convergence(error_ax, methods, 1, "error of the progress")
+        draw_convergence(residual_ax, methods, 2, "energy not accounted for")
+        error_ax.set_title(f"{frequency:g} Hz")
+    style.draw_legend_right(axes[0, -1])
     return fig
+
+
+def draw_convergence(ax, methods: dict, k: int, label: str) -> None:
+    """Draw entry k of each method against the steps of a cycle, with a line of order
+    2."""
+    looks = {"implicit": ("o-", style.BLUE), "explicit": ("s-", style.VERMILION)}
+    for method, entries in methods.items():
+        line, colour = looks[method]
+        values = np.where(np.isfinite(entries[k]), entries[k], np.nan)
+        ax.loglog(entries[0], values, line, color=colour, lw=1.0, label=method)
+    implicit = methods["implicit"]
+    style.draw_order_line(ax, implicit[0], implicit[k], 2)
+    ax.set(xlabel="steps of a cycle", ylabel=label)
+    style.draw_grid(ax)
 
 
 if __name__ == "__main__":

@@ -2,9 +2,9 @@
 minimum-perturbation frame against the force balance.
 
 Above: net distance per cycle, by the area under the CCF in each frame and by the force
-balance, which is the same in all. Below: how far the area tier is from the force
-balance in its own frame, and, dotted, the path tier, which integrates the same fitted
-connection along the gait: no frame removes its error.
+balance, which is the same in all. Below: distance of the area tier from the force
+balance in its own frame, and, dotted, of the path tier, which integrates the same
+fitted connection along the gait: no frame removes its error.
 """
 
 from __future__ import annotations
@@ -17,70 +17,76 @@ from geomech.mathematics.gaits import Butterfly, Circle
 from geomech.scenes import load
 from geomech.studies.scene_tables import SceneTables
 
-FRAMES = "mean", "link-2", "minimum-perturbation"
-GAITS = {
+FRAMES = ("mean", "link-2", "minimum-perturbation")
+GAITS = {  # gait, largest amplitude, name of the amplitude
     "circle": (Circle(), 2.0, "radius of the circle (rad)"),
     "butterfly": (Butterfly(), 1.2, "scale of the butterfly"),
 }
+TIERS = ("area", "path", "direct")
 
 
 def compute(scene: str = "three-link-glass", count: int = 20, grid: int = 31) -> dict:
     """Return {gait: {"amplitude": (B,), frame: {tier: (B, 3)}}} of net poses, body
     lengths and rad, each in its own frame.
 
-    The field reaches as far as the gaits.
+    The grid covers the gaits.
     """
-    study = SceneTables(load(scene)).with_numerics(grid=grid, extent=2.7)
-    found: dict = {
-        name: {"amplitude": np.linspace(0, top, count + 1)[1:]}
-        for name, (_, top, _) in GAITS.items()
-    }
+    tables = SceneTables(load(scene)).with_numerics(grid=grid, extent=2.7)
+    numbers: dict = {}
+    for name, (_, largest, _) in GAITS.items():
+        numbers[name] = {"amplitude": np.linspace(0, largest, count + 1)[1:]}
     for frame in FRAMES:
-        bench = study if frame == study.scene.frame else study.in_frame(frame)
+        frame_tables = tables
+        if frame != tables.scene.frame:
+            frame_tables = tables.in_frame(frame)
         for name, (gait, _, _) in GAITS.items():
-            a = found[name]["amplitude"]
-            found[name][frame] = {
-                tier: bench.poses(tier, gait, a) for tier in ("area", "path", "direct")
-            }
-    return found
+            amplitude = numbers[name]["amplitude"]
+            poses = {tier: frame_tables.poses(tier, gait, amplitude) for tier in TIERS}
+            numbers[name][frame] = poses
+    return numbers
 
 
-def missed(poses: dict, tier: str) -> np.ndarray:
+def net_distance(poses: np.ndarray) -> np.ndarray:
+    """Return the distances (B,) of net poses (B, 3)."""
+    return np.hypot(*poses[:, :2].T)
+
+
+def position_error(poses: dict, tier: str) -> np.ndarray:
     """Return the distances (B,) of a tier's positions from those of the force
     balance."""
-    return np.hypot(*(poses[tier] - poses["direct"])[:, :2].T)
+    return net_distance(poses[tier] - poses["direct"])
 
 
 @plots.styled
 def draw(numbers: dict):
+    """Draw a column for each gait: distances above, errors below."""
     fig, axes = plots.figure(7.4, 5.2, 2, 2)
-    for (name, (_, _, label)), above, below in zip(GAITS.items(), *axes):
-        a = numbers[name]["amplitude"]
-        above.plot(
-            a,
-            np.hypot(*numbers[name]["mean"]["direct"][:, :2].T),
-            color="0.72",
-            lw=4,
-            label="force balance",
-        )
-        for k, frame in enumerate(FRAMES, 1):
-            poses = numbers[name][frame]
-            look = style.sparse(k, len(a))
-            above.plot(
-                a,
-                np.hypot(*poses["area"][:, :2].T),
-                label=f"area, {frame} frame",
-                **look,
-            )
-            below.plot(a, missed(poses, "area"), **look)
-        below.plot(a, missed(numbers[name]["mean"], "path"), ":", color=style.BLACK)
-        style.entry(above, "path, any frame", ls=":", color=style.BLACK)
-        above.set(title=name, ylabel="net distance (BL)", ylim=(0, None))
-        below.set(xlabel=label, ylabel="off the force balance by (BL)", ylim=(0, None))
+    for column, name in zip(axes.T, GAITS):
+        draw_gait(column, name, numbers[name])
     fig.legend(
         *axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3
     )
     return fig
+
+
+def draw_gait(column, name: str, gait_numbers: dict) -> None:
+    """Draw net distances by frame on the upper axes, and errors on the lower ones."""
+    distance_ax, error_ax = column
+    amplitude = gait_numbers["amplitude"]
+    exact = net_distance(gait_numbers["mean"]["direct"])
+    distance_ax.plot(amplitude, exact, color="0.72", lw=4, label="force balance")
+    for k, frame in enumerate(FRAMES, 1):
+        poses = gait_numbers[frame]
+        look = style.curve_look(k, len(amplitude))
+        by_area = net_distance(poses["area"])
+        distance_ax.plot(amplitude, by_area, label=f"area, {frame} frame", **look)
+        error_ax.plot(amplitude, position_error(poses, "area"), **look)
+    path_error = position_error(gait_numbers["mean"], "path")
+    error_ax.plot(amplitude, path_error, ":", color=style.BLACK)
+    style.add_entry(distance_ax, "path, any frame", ls=":", color=style.BLACK)
+    _, _, label = GAITS[name]
+    distance_ax.set(title=name, ylabel="net distance (BL)", ylim=(0, None))
+    error_ax.set(xlabel=label, ylabel="off the force balance by (BL)", ylim=(0, None))
 
 
 if __name__ == "__main__":

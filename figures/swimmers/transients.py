@@ -1,11 +1,12 @@
 """The loss of a sandfish by the transient response of the ground (paper Sec. IV A).
 
-Resistive force theory takes the drag for steady at once. After a reversal the grains
+Resistive force theory takes the drag to be steady at once. After a reversal the grains
 need some travel, by the paper about a fifth of the amplitude of an oscillating rod, and
 the theory exceeds discrete-element simulation by up to 30 %. Left: net displacement
 over that without the effect, against the travel across over the wave's amplitude A,
-with the shares of the drag that are there at once in beds of grains (`figures.grains.beds`);
-there the travel is 2.8 diameters of a rod. Right: forward velocity through a cycle.
+with the shares of the drag that are there at once in beds of grains
+(`figures.grains.beds`); there the travel is 2.8 diameters of a rod. Right: forward
+velocity through a cycle.
 """
 
 from __future__ import annotations
@@ -19,16 +20,20 @@ from geomech.scenes import load
 from geomech.studies.displacement.batch import joined_scene
 from rft import Backbone, Transient
 
-AMPLITUDES = (0.1, 0.22, 0.4)  # A / lambda
-PUBLISHED = {
-    "travel": 0.2,
-    "excess": 0.3,
-}  # of A; of resistive force theory over discrete elements
-GRAINS = (
-    2.8 * 2 * 0.06
-)  # body lengths: diameters of a rod, of an animal as thick as `sandfish-loose` assumes
-VELOCITY = style.VERMILION  # of the animal's amplitude, whose velocity is shown
-SHARES = (0.0, 0.1, 0.2, 0.4, 0.6, 0.9, 1.3, 1.7, GRAINS / 0.16)
+ANIMAL = 0.22  # A / lambda of the animal, whose velocity is drawn
+ANIMAL_AMPLITUDE = 0.16  # its A, body lengths
+AMPLITUDES = {  # A / lambda: colour, marker
+    0.1: (style.BLUE, "o"),
+    ANIMAL: (style.VERMILION, "s"),
+    0.4: (style.GREEN, "^"),
+}
+PUBLISHED_TRAVEL = 0.2  # of A
+PUBLISHED_EXCESS = 0.3  # of resistive force theory over discrete elements
+# Travel in grains, body lengths: in diameters of a rod, of an animal as thick as
+# `sandfish-loose` assumes.
+GRAINS = 2.8 * 2 * 0.06
+GRAINS_SHARE = GRAINS / ANIMAL_AMPLITUDE
+SHARES = (0.0, 0.1, 0.2, 0.4, 0.6, 0.9, 1.3, 1.7, GRAINS_SHARE)
 
 
 def compute(shares=SHARES, elements: int = 40, phases: int = 64) -> dict:
@@ -39,18 +44,16 @@ def compute(shares=SHARES, elements: int = 40, phases: int = 64) -> dict:
     per rad.
     """
     fish = load("sandfish-loose")
-    scenes = [
-        fish.changed(
-            body=Backbone(elements),
-            effects=(
-                *fish.system.effects,  # the drag on its head
-                Transient(travel=share * a * float(Sine().wavelength(a))),
-            ),
-            gait=Sine(amplitude=a, elements=elements),
-        )
-        for a in AMPLITUDES
-        for share in shares
-    ]
+    head_drag = fish.system.effects
+    scenes = []
+    for amplitude in AMPLITUDES:
+        wavelength = float(Sine().wavelength(amplitude))
+        gait = Sine(amplitude=amplitude, elements=elements)
+        for share in shares:
+            transient = Transient(travel=share * amplitude * wavelength)
+            effects = (*head_drag, transient)
+            scene = fish.changed(body=Backbone(elements), effects=effects, gait=gait)
+            scenes.append(scene)
     run = joined_scene(scenes).cycle(phases=phases)
     net = np.hypot(run.net[:, 0], run.net[:, 1]).reshape(len(AMPLITUDES), -1)
     xi = run.xi.reshape(len(AMPLITUDES), len(shares), phases, 3)
@@ -58,57 +61,53 @@ def compute(shares=SHARES, elements: int = 40, phases: int = 64) -> dict:
         "shares": np.array(shares),
         "net": net / net[:, :1],
         "t": 2 * np.pi * np.arange(phases) / phases,
-        "velocity": xi[AMPLITUDES.index(0.22), :, :, 0],
+        "velocity": xi[list(AMPLITUDES).index(ANIMAL), :, :, 0],
     }
 
 
 @plots.styled
 def draw(numbers: dict):
+    """Draw displacement against the travel, and velocity through a cycle."""
     fig, axes = plots.figure(7.6, 3.0, 2)
     left, right = axes[0]
-    for a, net, colour, marker in zip(
-        AMPLITUDES, numbers["net"], (style.BLUE, VELOCITY, style.GREEN), "os^"
-    ):
-        left.plot(
-            numbers["shares"],
-            net,
-            color=colour,
-            marker=marker,
-            label=rf"$A/\lambda$ = {a:g}",
-        )
-    left.axvline(PUBLISHED["travel"], **style.GUIDE, ls="--")
-    left.axvline(GRAINS / 0.16, **style.GUIDE, ls=":")
-    left.axhline(1 / (1 + PUBLISHED["excess"]), **style.GUIDE, ls="-.")
-    left.text(
-        1.0,
-        1 / (1 + PUBLISHED["excess"]) + 0.012,
-        "largest published excess",
-        **style.NOTE,
-    )
-    left.text(PUBLISHED["travel"] + 0.03, 0.32, "published travel", **style.NOTE)
-    left.text(
-        GRAINS / 0.16 - 0.03,
-        0.98,
-        r"in grains ($A/\lambda$ = 0.22)",
-        ha="right",
-        **style.NOTE,
-    )
-    left.set(
+    draw_displacement(left, numbers)
+    draw_velocity(right, numbers)
+    return fig
+
+
+def draw_displacement(ax, numbers: dict) -> None:
+    """Draw displacement over that with steady drag, and the published numbers."""
+    for (amplitude, look), net in zip(AMPLITUDES.items(), numbers["net"]):
+        colour, marker = look
+        label = rf"$A/\lambda$ = {amplitude:g}"
+        ax.plot(numbers["shares"], net, color=colour, marker=marker, label=label)
+    with_excess = 1 / (1 + PUBLISHED_EXCESS)
+    ax.axvline(PUBLISHED_TRAVEL, **style.GUIDE, ls="--")
+    ax.axvline(GRAINS_SHARE, **style.GUIDE, ls=":")
+    ax.axhline(with_excess, **style.GUIDE, ls="-.")
+    ax.text(1.0, with_excess + 0.012, "largest published excess", **style.NOTE)
+    ax.text(PUBLISHED_TRAVEL + 0.03, 0.32, "published travel", **style.NOTE)
+    note = rf"in grains ($A/\lambda$ = {ANIMAL:g})"
+    ax.text(GRAINS_SHARE - 0.03, 0.98, note, ha="right", **style.NOTE)
+    ax.set(
         xlabel="travel to 95 % of the drag / $A$",
         ylabel="displacement per cycle /\nthat with steady drag",
+        xlim=(0, None),
+        ylim=(0.28, 1.02),
     )
-    left.set(xlim=(0, None), ylim=(0.28, 1.02))
-    left.legend(loc="lower left", bbox_to_anchor=(0.1, 0.08))
-    for share, dashes in ((0.0, "-"), (0.2, "--"), (GRAINS / 0.16, ":")):
+    ax.legend(loc="lower left", bbox_to_anchor=(0.1, 0.08))
+
+
+def draw_velocity(ax, numbers: dict) -> None:
+    """Draw forward velocity with steady drag, the published travel and grains'."""
+    colour, _ = AMPLITUDES[ANIMAL]
+    for share, dashes in ((0.0, "-"), (PUBLISHED_TRAVEL, "--"), (GRAINS_SHARE, ":")):
         k = int(np.argmin(np.abs(numbers["shares"] - share)))
         label = "steady drag" if share == 0 else f"travel {share:.1f} $A$"
-        right.plot(
-            numbers["t"], numbers["velocity"][k], dashes, color=VELOCITY, label=label
-        )
-    style.phase_axis(right)
-    right.set(ylabel=r"$\xi_x$ (BL/rad), $A/\lambda$ = 0.22", ylim=(0, None))
-    style.legend_above(right, 3)
-    return fig
+        ax.plot(numbers["t"], numbers["velocity"][k], dashes, color=colour, label=label)
+    style.set_phase_axis(ax)
+    ax.set(ylabel=rf"$\xi_x$ (BL/rad), $A/\lambda$ = {ANIMAL:g}", ylim=(0, None))
+    style.draw_legend_above(ax, 3)
 
 
 if __name__ == "__main__":

@@ -21,17 +21,17 @@ WHEELS = {"smooth": Wheel(0.1, 0.1), "12 lugs": Wheel(0.1, 0.1, 12, 0.015, 0.006
 
 
 def compute(slips: int = 23, load: float = 20.0, strength: float = 1.0) -> dict:
-    """Return slip (N,), the load, N, and "found": for each wheel {rate: Rolling}, with
+    """Return slip (N,), the load, N, and "wheels": for each {rate: Rolling}, with
     the rate 0 for the law without inertia."""
     slip = np.linspace(-0.2, 0.9, slips)
     stress = VERTICAL["poppy-seeds-loose"].stress
     inertia = [GrainInertia(strength)]
-    found = {}
+    wheels = {}
     for name, wheel in WHEELS.items():
-        found[name] = {0.0: rolling(stress, wheel, load, 1.0, slip)}
+        wheels[name] = {0.0: rolling(stress, wheel, load, 1.0, slip)}
         for rate in RATES:
-            found[name][rate] = rolling(stress, wheel, load, rate, slip, inertia)
-    return {"slip": slip, "load": load, "found": found}
+            wheels[name][rate] = rolling(stress, wheel, load, rate, slip, inertia)
+    return {"slip": slip, "load": load, "wheels": wheels}
 
 
 @plots.styled
@@ -39,14 +39,14 @@ def draw(numbers: dict):
     """Draw a column for each wheel: pull above, sinkage below."""
     fig, axes = plots.figure(7.4, 5.0, 2, 2)
     colours = (style.BLACK, *style.shades(len(RATES)))
-    for (pull_ax, sinkage_ax), (name, lines) in zip(axes.T, numbers["found"].items()):
+    for (pull_ax, sinkage_ax), (name, lines) in zip(axes.T, numbers["wheels"].items()):
         for (rate, line), colour in zip(lines.items(), colours):
             look = {"color": colour, "lw": 1.0, "label": f"{rate:g} rad/s"}
             if rate == 0:
                 look |= {"lw": 2.0, "label": "no inertia, any rate"}
             pull_ax.plot(numbers["slip"], line.pull / numbers["load"], **look)
             sinkage_ax.plot(numbers["slip"], 1e3 * line.sinkage, **look)
-        style.zero_line(pull_ax)
+        style.draw_zero_line(pull_ax)
         pull_ax.set(title=name, ylabel="drawbar pull / load")
         sinkage_ax.set(xlabel="slip", ylabel="sinkage (mm)")
         sinkage_ax.invert_yaxis()

@@ -460,11 +460,11 @@ def test_the_figure_of_grains_shows_beds_beside_laws():
     )
     late = {
         case: (x["at_once"][0], 1e3 * x["travel"][0])
-        for case, x in numbers["stretches"].items()
+        for case, x in numbers["last_strokes"].items()
     }
     assert late[0.04, 0.0245, 90] == pytest.approx((0.32, 61.4), abs=0.05)
     assert late[0.02, 0.0150, 90] == pytest.approx((-0.03, 36.8), abs=0.05)
-    for (a, angle), way in numbers["ways"].items():  # fitted at 20 mm
+    for (a, angle), way in numbers["after_reversal"].items():  # fitted at 20 mm
         assert np.sqrt(np.mean((way["grains"] - way["law"]) ** 2)) < 0.11, (a, angle)
     assert "circle 1 rad" in figure.table(numbers)
     circles, others, lifts, right = figure.draw(numbers).axes
@@ -554,7 +554,7 @@ def test_plates_in_grains_stand_beside_bars_and_the_map():
     """The rows of a bar add up to it; stress on them is force over their area and depth; grains press where the map pulls."""
     from figures.grains import plates as figure
     from figures.grains.campaigns import grains as campaign
-    from figures.paper.fig08a_rods import on_face
+    from figures.paper.fig08a_rods import face_stress
 
     rows, lift = campaign.read("faces"), campaign.read("lift")
     for key in ("drag_N", "lift_N"):
@@ -573,7 +573,7 @@ def test_plates_in_grains_stand_beside_bars_and_the_map():
         / (campaign.BAR_DEPTH + campaign.BAR * np.cos(bar["beta"]))
     }
     for rule, ratio in (("keep", 0.81), ("cut", 0.68)):
-        stress = on_face(StressMap(tension=rule), figure.BETA)
+        stress = face_stress(StressMap(tension=rule), figure.BETA)
         assert figure.lift_over_drag(deep, figure.BETA, *stress) == pytest.approx(
             ratio, abs=0.01
         )

@@ -159,9 +159,9 @@ def test_frames_area(tmp_path):
         np.testing.assert_allclose(
             distance[1:], distance[:1] * np.ones((2, 1)), rtol=1e-5
         )
-        of_path = frames_area.missed(gait["mean"], "path")
+        of_path = frames_area.position_error(gait["mean"], "path")
         apart = {
-            frame: np.abs(frames_area.missed(gait[frame], "area") - of_path)[-1]
+            frame: np.abs(frames_area.position_error(gait[frame], "area") - of_path)[-1]
             for frame in frames_area.FRAMES
         }
         assert apart["minimum-perturbation"] < 0.25 * min(
@@ -175,10 +175,10 @@ def test_frames_area(tmp_path):
         curve(above, "area, link-2 frame"), [circle["amplitude"], far]
     )
     np.testing.assert_allclose(
-        below.lines[1].get_ydata(), frames_area.missed(circle["link-2"], "area")
+        below.lines[1].get_ydata(), frames_area.position_error(circle["link-2"], "area")
     )
     np.testing.assert_allclose(
-        below.lines[3].get_ydata(), frames_area.missed(circle["mean"], "path")
+        below.lines[3].get_ydata(), frames_area.position_error(circle["mean"], "path")
     )
 
 

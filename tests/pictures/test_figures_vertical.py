@@ -59,7 +59,7 @@ def test_fig06b(tmp_path):
 def test_fig07(tmp_path):
     found = fig07_stress_maps.compute(cells=90)
     assert found["survey"].pulling == pytest.approx(0.13, abs=0.005)  # DESIGN section 9
-    off = {name: medium["off"] for name, medium in found["media"].items()}
+    off = {name: medium["difference"] for name, medium in found["media"].items()}
     assert off == pytest.approx(
         {"poppy-seeds-loose": 0.088, "poppy-seeds-close": 0.161}, abs=5e-4
     )
@@ -122,7 +122,9 @@ def test_fig08a_stress_around_the_cylinder_is_that_on_plates():
     found = fig08a_rods.compute(depths=3)
     around, normal, tangent = (
         found["cylinder"],
-        *fig08a_rods.on_face(fig08a_rods.VERTICAL["glass-3mm"].stress, found["beta"]),
+        *fig08a_rods.face_stress(
+            fig08a_rods.VERTICAL["glass-3mm"].stress, found["beta"]
+        ),
     )
     for what in ("normal", "tangent"):
         assert (
@@ -174,8 +176,18 @@ def test_fig08b(tmp_path):
     # Each has its own peak and its own phase (Fig. 8(b)).
     assert c["z"]["peak"] > reversed_["z"]["peak"] > flat["z"]["peak"] > 1
     assert c["x"]["peak"] > flat["x"]["peak"] > reversed_["x"]["peak"] > 1
-    assert c["x"]["at"] < flat["x"]["at"] < 0 < reversed_["x"]["at"]
-    assert c["z"]["at"] < flat["z"]["at"] < 0 < reversed_["z"]["at"]
+    assert (
+        c["x"]["peak_angle"]
+        < flat["x"]["peak_angle"]
+        < 0
+        < reversed_["x"]["peak_angle"]
+    )
+    assert (
+        c["z"]["peak_angle"]
+        < flat["z"]["peak_angle"]
+        < 0
+        < reversed_["z"]["peak_angle"]
+    )
     assert (
         flat["z"]["least"] < -0.5
         and reversed_["z"]["least"] < -0.2

@@ -12,7 +12,12 @@ import warnings
 import numpy as np
 import pytest
 
-from figures.accuracy.cost_scaling import NAMES, backends, one_scipy_solve, quickest
+from figures.accuracy.cost_scaling import (
+    NAMES,
+    backends,
+    one_scipy_solve,
+    shortest_time,
+)
 from geomech.mathematics.gaits import Butterfly, Circle, Sine
 from geomech.mathematics.geometry import connection
 from geomech.mathematics.systems import Solver, Swimmer
@@ -37,7 +42,7 @@ def in_turn(asked: dict, rounds: int = 5) -> dict[str, float]:
     times = {name: [] for name in asked}
     for _ in range(rounds):
         for name, f in asked.items():
-            times[name].append(quickest(f, 1))
+            times[name].append(shortest_time(f, 1))
     return {name: float(np.median(t)) for name, t in times.items()}
 
 

@@ -1527,14 +1527,14 @@ def test_a_gait_for_sand_is_searched_for(tmp_path):
     from figures.robots import sand_gaits
 
     numbers = sand_gaits.compute(2, 4, 0.6)
-    for speeds in numbers["found"].values():
+    for speeds in numbers["best_speeds"].values():
         assert speeds[1] >= speeds[0] > -1.0
     assert (
         numbers["speeds"].shape == (2, 2)
         and len(numbers["strip"]) == sand_gaits.SNAPSHOTS
     )
     assert numbers["speeds"][0, 0] == pytest.approx(
-        numbers["found"]["sand"][-1], abs=1e-12
+        numbers["best_speeds"]["sand"][-1], abs=1e-12
     )
     figure = drawn(sand_gaits, numbers, tmp_path)
     assert [bar.get_height() for bar in figure.axes[1].patches] == [

@@ -208,7 +208,7 @@ def test_the_figure_of_screws_is_drawn(tmp_path, monkeypatch):
     numbers = screws.compute(
         3, (0.06,), (0.06,), dataclasses.replace(COARSE, duration=1.0)
     )
-    assert numbers["found"] == pytest.approx(
+    assert numbers["mujoco_advance"] == pytest.approx(
         numbers["advance"][1.0], rel=0.2
     )  # in the first two turns
     assert "by MuJoCo" in screws.table(numbers)
@@ -223,10 +223,11 @@ def test_the_figure_of_screws_is_drawn(tmp_path, monkeypatch):
     thrust, advance, _, path = drawn(screws, numbers, tmp_path).axes
     np.testing.assert_allclose(
         curve(thrust, "at the surface"),
-        [numbers["slip"], numbers["pulled"][0.0].thrust],
+        [numbers["slip"], numbers["turning"][0.0].thrust],
     )
     np.testing.assert_allclose(
-        curve(advance, "1 kg, MuJoCo"), 1e3 * np.array([[0.06], numbers["found"]])
+        curve(advance, "1 kg, MuJoCo"),
+        1e3 * np.array([[0.06], numbers["mujoco_advance"]]),
     )
     np.testing.assert_allclose(
         curve(path, "alike, 1 kg, 4 s"),

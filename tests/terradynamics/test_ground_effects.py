@@ -150,7 +150,10 @@ def test_inertia_of_grains_is_seen_on_a_leg_above_some_230_rpm(tmp_path):
     slow, seen = (
         numbers["added"][:, list(numbers["rates"]).index(rpm)] for rpm in (30, 230)
     )
-    assert numbers["at"][0] == pytest.approx(239, abs=1) and slow.max() < 0.01
+    assert (
+        numbers["noticeable_rates"][0] == pytest.approx(239, abs=1)
+        and slow.max() < 0.01
+    )
     assert seen == pytest.approx(np.array([1, 2, 4]) * seen[0], rel=1e-9) and seen[
         0
     ] == pytest.approx(0.093, abs=0.001)

@@ -1085,14 +1085,14 @@ def test_figures_of_walking_are_drawn(tmp_path, monkeypatch):
     sandbot = scenes.load("sandbot")
     other = lambda name: walking_sensitivity.CHOICES.get(name, (1.0, 1.4))[1]
     wide = [
-        walking_sensitivity.varied(sandbot, name, other(name))
+        walking_sensitivity.with_change(sandbot, name, other(name))
         for name in walking_sensitivity.NAMES
     ]
     assert wide[-2].medium.tension == "cut" and wide[-1].robot.belly(8).points[
         :, 1
     ] == pytest.approx(-0.025)
     assert all(
-        walking_sensitivity.varied(sandbot, n, some[0]) == sandbot
+        walking_sensitivity.with_change(sandbot, n, some[0]) == sandbot
         for n, some in walking_sensitivity.CHOICES.items()
     )
     assert walking_sensitivity.table(made[walking_sensitivity]).count("+0") == 5 * (
@@ -1104,7 +1104,7 @@ def test_figures_of_walking_are_drawn(tmp_path, monkeypatch):
     assert left[-1] < 0.02 and (chattering > 0).all()
     left_of_energy = axes[walking_steps][1]
     np.testing.assert_allclose(curve(left_of_energy, "explicit"), [[64], chattering])
-    smooth, lugs = made[wheel]["found"].values()
+    smooth, lugs = made[wheel]["wheels"].values()
     np.testing.assert_allclose(
         curve(axes[wheel][3], "30 rad/s"),
         [made[wheel]["slip"], 1e3 * lugs[30.0].sinkage],

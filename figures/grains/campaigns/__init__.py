@@ -1,2 +1,2 @@
-"""Long computations by hand, whose results are shipped as CSV files beside the
+"""Long computations, started by hand; their results are the CSV files next to the
 scripts."""
