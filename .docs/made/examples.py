@@ -69,11 +69,17 @@ class Example:
     def __init__(self, page: str, text: str):
         self.page, self.title = page, text.partition("\n")[0].strip()
         self.anchor = re.sub(r"[^\w -]", "", self.title.lower()).replace(" ", "-")
-        self.picture = re.search(r"[\w-]+\.(?:png|gif)\b", text)[0]
         self.text = BLOCK.sub("", text.partition("\n")[2]).strip()
         self.blocks = {
             language: (name, code) for language, name, code in BLOCK.findall(text)
         }
+        picture = re.search(r"[\w-]+\.(?:png|gif)\b", text)
+        if picture is None or not {"sh", "python"} <= {*self.blocks}:
+            raise ValueError(
+                f"{page}.md, {self.title}: an example needs a block sh that draws a "
+                "picture, and a block python"
+            )
+        self.picture = picture[0]
 
     def compute(self) -> None:
         """Run the command and the program, and store the command's picture."""

@@ -21,9 +21,9 @@ from geomech.plots.maps import (
 from geomech.plots.style import blank, figure, quantity, styled
 from geomech.results.fields import field_of
 from geomech.results.scenes import scene_of
+from geomech.studies.displacement.variables import poses
 from geomech.studies.maps.fields import angle_names
 from geomech.studies.mechanics.motion import Motion
-from geomech.studies.tables import poses
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -34,8 +34,8 @@ from geomech.mathematics.tiers.base import Plan, Table, Tier, in_groups
 from geomech.run.progress import progress as shown_progress
 from geomech.scenes.frames import framed
 from geomech.scenes.model import Scene, frequency_of
-from geomech.studies import tables
 from geomech.studies.available import available_tiers, default_tiers
+from geomech.studies.displacement.variables import displacement_result, timing_variables
 from geomech.studies.estimates import cost, effort, estimate, uncertainty
 from rft.core.checks import real_array
 from rft.core.refusal import Refusal, located
@@ -347,7 +347,7 @@ class SceneTables:
         gait: Gait | None = None,
         progress: Callable | None = None,
     ) -> Result:
-        """Return the net poses (`geomech.studies.tables.displacement_result`) by tiers
+        """Return the net poses (`geomech.studies.displacement.variables.displacement_result`) by tiers
         of TIERS (`default_tiers` if None), with their errors
         (`geomech.studies.estimates.estimate`).
 
@@ -364,8 +364,8 @@ class SceneTables:
         if medium:
             seconds["medium"] = took
         poses, errors, spreads = self._predict(plans, gait, values, seconds)
-        timings = tables.timing_variables(seconds, computed_before)
-        return tables.displacement_result(
+        timings = timing_variables(seconds, computed_before)
+        return displacement_result(
             scene, gait, values, poses, errors, medium, spreads, timings
         )
 

@@ -1,4 +1,7 @@
-"""Bodies, one a file."""
+"""Bodies, one a file.
+
+A new file in this folder is found by itself (`rft.core.registry.load_all`); imports
+here are the public names. `rft.bodies.chain` is a short example."""
 
 from rft.bodies.backbone import Backbone, ConstantCurvature, Serpenoid
 from rft.bodies.base import BODIES, Body, Elements

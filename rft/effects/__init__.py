@@ -1,5 +1,9 @@
 """Effects beyond the plain force law, one a file; only those that a scene lists are
-computed."""
+computed.
+
+A new file in this folder is found by itself (`rft.core.registry.load_all`); imports
+here are the public names. `rft.effects.skin` is a short example, `rft.effects.base`
+tells what an effect may define."""
 
 from rft.core.registry import load_all
 from rft.effects.base import (

@@ -1,4 +1,7 @@
-"""Force laws, one a file, and the catalogue of named media."""
+"""Force laws, one a file, and the catalogue of named media.
+
+A new file in this folder is found by itself (`rft.core.registry.load_all`); imports
+here are the public names. `rft.laws.viscous` is a short example."""
 
 from rft.core.registry import load_all
 from rft.laws.base import (

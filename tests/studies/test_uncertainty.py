@@ -17,9 +17,9 @@ from geomech.plots.displacement import sweeps
 from geomech.scenes import Scene
 from geomech.studies.displacement import sweep
 from geomech.studies.displacement.choose import cheapest_displacements
+from geomech.studies.displacement.variables import QUANTITIES, pose_quantities
 from geomech.studies.estimates import uncertainty
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.tables import QUANTITIES, pose_quantities
 from rft import Chain, Granular, SkinFriction, Transient, Viscous
 from rft.core.refusal import Refusal
 

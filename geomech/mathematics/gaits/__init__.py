@@ -1,4 +1,7 @@
-"""Gaits: closed curves in shape space, one file each."""
+"""Gaits: closed curves in shape space, one file each.
+
+A new file in this folder is found by itself (`rft.core.registry.load_all`); imports
+here are the public names. `geomech.mathematics.gaits.polygon` is a short example."""
 
 from geomech.mathematics.gaits.centreline import Centreline
 from geomech.mathematics.gaits.fourier import Butterfly, Circle, Ellipse, Fourier

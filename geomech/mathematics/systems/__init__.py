@@ -1,5 +1,9 @@
 """Systems, one in each file: objects with a velocity(alpha, alphadot) and their
-traits."""
+traits.
+
+A new file in this folder is found by itself (`rft.core.registry.load_all`); imports
+here are the public names. `geomech.mathematics.systems.diff_drive` is a short
+example."""
 
 from geomech.mathematics.geometry.traits import Traits
 from geomech.mathematics.systems.base import (

@@ -16,7 +16,7 @@ from geomech.mathematics.geometry.representations.field import UNKNOWN_UNIT
 from geomech.mathematics.tiers import TIERS, Tier
 from geomech.plots.style import axes_of, figure, shared_legend, styled
 from geomech.scenes.data.measurements import converted, units_of
-from geomech.studies.tables import QUANTITIES, pose_quantities
+from geomech.studies.displacement.variables import QUANTITIES, pose_quantities
 from rft.core.refusal import printable
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from geomech.plots.displacement.displacements import medium_band
 from geomech.plots.style import MARKED, figure, quantity, styled
 from geomech.scenes.model import Scene
 from geomech.studies.displacement.cycles import AMPLITUDE
-from geomech.studies.tables import position_spread
+from geomech.studies.displacement.variables import position_spread
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:

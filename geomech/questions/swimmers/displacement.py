@@ -1,5 +1,6 @@
 """The net displacement of a gait per cycle: by each tier with its error, or by the
-cheapest that is accurate enough."""
+cheapest that is accurate enough. Its variables are made in
+`geomech.studies.displacement.variables`."""
 
 import re
 from collections.abc import Iterable, Sequence

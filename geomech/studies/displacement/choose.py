@@ -21,7 +21,7 @@ from geomech.mathematics.systems.capabilities import (
 from geomech.mathematics.tiers.base import Plan, solved_phases
 from geomech.mathematics.tiers.direct import DIRECT
 from geomech.scenes.model import Scene
-from geomech.studies import tables
+from geomech.studies.displacement.variables import displacement_result, timing_variables
 from geomech.studies.estimates import cost, uncertainty
 from geomech.studies.estimates.elements import (
     MAX_ELEMENTS,
@@ -121,11 +121,11 @@ def cheapest_displacements(
     answer = _cheapest_answer(request)
 
     seconds = {answer.tier: time.perf_counter() - start}
-    more = tables.timing_variables(seconds, ())
+    more = timing_variables(seconds, ())
     for name, value in answer.settings.items():
         label = "chosen for the tolerance"
         more.append(Variable(f"chosen_{name}", (), value, "1", label))
-    return tables.displacement_result(
+    return displacement_result(
         scene,
         gait,
         amplitudes,

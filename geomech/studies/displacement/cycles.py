@@ -15,8 +15,8 @@ from geomech.mathematics.systems.capabilities import gaits_per_batch
 from geomech.run.cost import Cost
 from geomech.scenes import write as written
 from geomech.scenes.model import Scene, checked_scene
-from geomech.studies import tables
 from geomech.studies.displacement.batch import batch_key, joined_scene
+from geomech.studies.displacement.variables import QUANTITIES, pose_variables
 from geomech.studies.estimates import estimate, uncertainty
 from geomech.studies.estimates.cost import direct_jobs, medium_jobs, total_cost
 from geomech.studies.grid import Grid, values_at_points
@@ -95,7 +95,7 @@ class Cycles:
         unit = length_unit(first.system)  # a swept length gives every point a size
         errors = np.stack([length * rows[..., 3], rows[..., 4]], -1)
         frequency = values_at_points(grid.over, FREQUENCIES, scene.frequency)
-        found = tables.pose_variables(
+        found = pose_variables(
             dims, rows[..., :3], errors, unit, _spreads(rows, length), frequency
         )
         found.append(Variable("body_length", dims, length, unit, "length of the body"))
@@ -118,7 +118,7 @@ def _spreads(rows: np.ndarray, length: np.ndarray) -> dict[str, np.ndarray] | No
     sizes = [length, length, np.ones_like(length), length]
     return {
         name: deviation * size
-        for name, deviation, size in zip(tables.QUANTITIES, deviations, sizes)
+        for name, deviation, size in zip(QUANTITIES, deviations, sizes)
     }
 
 
@@ -199,7 +199,7 @@ def _medium_deviations(joined: Scene) -> np.ndarray:
     deviations = uncertainty.medium_spread(joined, joined.gait, None)
     length = body_size(joined.system)
     columns = []
-    for name in tables.QUANTITIES:
+    for name in QUANTITIES:
         size = 1.0 if name == "heading" else length
         columns.append(deviations[name] / size)
     return np.column_stack(columns)

@@ -44,7 +44,7 @@ from geomech.mathematics.tiers.base import Numerics, Table, in_groups
 from geomech.mathematics.tiers.fitted import axes
 from geomech.mathematics.tiers.harmonic import HARMONIC
 from geomech.scenes.model import Scene
-from geomech.studies import tables
+from geomech.studies.displacement.variables import DIMS
 from geomech.studies.estimates.elements import error_by_elements, n_elements
 from geomech.studies.estimates.estimate import MAX_PIECES, every_nth_phase
 from rft.core.checks import in_range, real_array
@@ -378,7 +378,7 @@ def with_effort(result: Result, scene: Scene, gait: Gait | None = None) -> Resul
         over = ("amplitude",)
         added.append(Variable(name, over, efforts[name], unit.get(name, ""), "", error))
     for name, values in ratios.items():
-        added.append(Variable(name, tables.DIMS, values, unit.get(name, "")))
+        added.append(Variable(name, DIMS, values, unit.get(name, "")))
     return replace(result, variables=(*result.variables, *added))
 
 

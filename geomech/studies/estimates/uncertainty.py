@@ -31,7 +31,7 @@ from geomech.mathematics.systems.capabilities import (
 )
 from geomech.mathematics.tiers.base import in_groups
 from geomech.scenes.model import Scene
-from geomech.studies.tables import QUANTITIES, pose_quantities
+from geomech.studies.displacement.variables import QUANTITIES, pose_quantities
 from rft.core.checks import unmasked
 from rft.core.refusal import Refusal, located
 

@@ -40,9 +40,9 @@ from geomech.mathematics.systems.capabilities import (
 from geomech.mathematics.systems.framed import Framed
 from geomech.scenes import toml
 from geomech.scenes.model import Scene
+from geomech.studies.displacement.variables import COMPONENTS
 from geomech.studies.estimates import effort
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.tables import COMPONENTS
 from rft.core.refusal import Refusal
 
 # Contents of files.

@@ -23,6 +23,7 @@ from geomech.mathematics.tiers.fitted import finest_grid, refuse
 from geomech.mathematics.tiers.harmonic import is_looked_up
 from geomech.run.cost import Cost
 from geomech.scenes.model import Scene
+from geomech.studies.displacement.variables import COMPONENTS, POSE
 from geomech.studies.estimates.cost import (
     Job,
     connection_jobs,
@@ -38,7 +39,6 @@ from geomech.studies.estimates.effort import shares_velocities, why_no_metric
 from geomech.studies.maps import fields
 from geomech.studies.maps.fields import WHOLE, has_matrix
 from geomech.studies.scene_tables import SceneTables, refuse_outside
-from geomech.studies.tables import COMPONENTS, POSE
 from rft.core.checks import is_whole
 from rft.core.refusal import Refusal, located
 

@@ -23,6 +23,7 @@ from geomech.mathematics.systems.capabilities import (
 from geomech.mathematics.tiers.path import PATH
 from geomech.run.cost import Cost
 from geomech.scenes.model import Scene
+from geomech.studies.displacement.variables import COMPONENTS, POSE, zero_reason
 from geomech.studies.estimates.cost import (
     connection_jobs,
     direct_jobs,
@@ -31,7 +32,6 @@ from geomech.studies.estimates.cost import (
 )
 from geomech.studies.maps import fields
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.tables import COMPONENTS, POSE, zero_reason
 from rft.core.checks import is_whole
 from rft.core.premise import Premise
 from rft.core.refusal import Refusal, located

@@ -13,11 +13,11 @@ from geomech.mathematics.geometry.symmetry import zero_components
 from geomech.mathematics.systems.base import body_size, length_unit, shape_labels
 from geomech.scenes.model import Scene
 from geomech.scenes.write import toml
+from geomech.studies.displacement.variables import COMPONENTS, zero_reason
 from geomech.studies.estimates.effort import units, why_no_metric
 from geomech.studies.maps import fields
 from geomech.studies.optimisation.limiting import PHASES, limiting
 from geomech.studies.optimisation.optimum import Optimum
-from geomech.studies.tables import COMPONENTS, zero_reason
 from rft.core.refusal import Refusal
 
 # How far local optima were searched.

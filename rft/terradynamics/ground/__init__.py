@@ -1,5 +1,8 @@
 """The ground under plates and triangles: its strength and rounding, the lead of faces,
-and effects on the ground, one file each."""
+and effects on the ground, one file each.
+
+A new file in this folder is found by itself (`rft.core.registry.load_all`); imports
+here are the public names. `rft.terradynamics.ground.slope` is a short example."""
 
 from rft.core.registry import load_all
 from rft.terradynamics.ground.aeration import Aeration
