@@ -60,44 +60,6 @@ def test_viscous_chain_agrees_with_sympy(link):
     assert (got.iterations == 1).all()
 
 
-def plain_force(medium, lengths, alpha, alphadot, xi, eps, nodes=4000):
-    """Net force and moment in the middle link's frame of a three-link body, written out anew: midpoint segments."""
-    force = np.zeros(3)
-    half = np.array(lengths) / sum(lengths) / 2
-    s = (np.arange(nodes) + 0.5) / nodes * 2 - 1
-    for heading, turn, joint, sign, h in (
-        (-alpha[0], -alphadot[0], -half[1], -1, half[0]),
-        (0.0, 0.0, 0.0, 0, half[1]),
-        (alpha[1], alphadot[1], half[1], 1, half[2]),
-    ):
-        along, normal = np.array(
-            [[np.cos(heading), np.sin(heading)], [-np.sin(heading), np.cos(heading)]]
-        )
-        arm = (s + sign)[:, None] * h * along  # from the joint
-        place = np.array([joint, 0.0]) + arm
-        velocity = (
-            xi[:2] + xi[2] * place @ [[0, 1], [-1, 0]] + turn * arm @ [[0, 1], [-1, 0]]
-        )
-        f_t, f_n = medium.traction(velocity @ along, velocity @ normal, eps)
-        f = 2 * h / nodes * (f_t[:, None] * along + f_n[:, None] * normal)
-        force += [*f.sum(0), (place[:, 0] * f[:, 1] - place[:, 1] * f[:, 0]).sum()]
-    return force
-
-
-@pytest.mark.parametrize("medium", ["glass-0.3mm-loose", "coulomb", "viscous-2"])
-def test_forces_vanish_by_an_independent_sum(medium):
-    body = Chain((1, 2, 1.5), frame="link-2")
-    alpha, alphadot = samples(body, 12, seed=3)
-    alphadot /= np.linalg.norm(alphadot, axis=1, keepdims=True)
-    eps = 1e-3
-    xi = body_velocity(MEDIA[medium], body, alpha, alphadot, regularisation=eps).xi
-    for a, d, x in zip(alpha, alphadot, xi):
-        residual = plain_force(MEDIA[medium], body.lengths, a, d, x, eps)
-        assert np.abs(residual).max() < 1e-5  # of the order 2 midpoint rule
-        moved = plain_force(MEDIA[medium], body.lengths, a, d, x + [0.01, 0, 0], eps)
-        assert np.abs(moved).max() > 1e-4  # the test can tell
-
-
 @pytest.mark.parametrize("rule", ["midpoint", "gauss"])
 def test_quadrature_loads_approach_the_exact_ones(rule):
     problem = GLASS, THREE, *samples(THREE, 60, seed=4)

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from by_hand import drag, middles, points
 from loads import as_array, element_load
 from registry import BODIES
 from scipy import integrate, optimize
@@ -25,7 +26,6 @@ from rft import (
     time_steps,
     work_done,
 )
-from rft.bodies.base import body_size
 from rft.bodies.pieces import Pieces, subdivide
 from rft.effects.base import Site
 from rft.effects.contact import NO_MEMORY, assemble
@@ -36,7 +36,6 @@ from rft.laws.records import record
 pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 UNEVEN = Chain((1, 1.4, 0.8))
-MIDDLES = (np.arange(8000) + 0.5) / 4000 - 1  # of equal parts of an element
 
 
 def straight(effects, body=None):
@@ -113,7 +112,7 @@ def test_sides_are_parts_of_the_whole():
     left, right = with_shares(1, 0)(*v, eps), with_shares(0, 1)(*v, eps)
     whole = element_load(GLASS)(*v, eps)
     np.testing.assert_allclose((left + right)[1:], whole[1:], atol=1e-12)
-    s = MIDDLES[:, None, None]
+    s = 2 * middles(8000)[:, None, None] - 1
     u = v[1] + v[2] * s
     f_t, f_n = GLASS.traction(v[0], u, 1e-3)
     for part, side in ((left, u > 0), (right, u < 0)):
@@ -190,15 +189,6 @@ def test_a_rod_to_and_fro_bears_the_drag_of_the_closed_form(row, travel, at_once
         assert (load / steady).item() == pytest.approx(share)
 
 
-def test_a_piece_that_turns_remembers_both_of_its_sides():
-    """About its middle for a long way each half has built up its own side, so that the piece has none; the second has
-    its pivot at a quarter of its length."""
-    v = np.array([[[0.0], [0.0]], [[0.0], [0.5]], [[1.0], [1.0]]])
-    site = Site(1, 1.0, np.zeros((3, 1)), 0 * v)
-    memory = Transient(travel=0.01).after(None, site, np.ones((2, 2, 1)), v)
-    np.testing.assert_allclose(memory[1, :, 0], [0.0, 0.5], atol=1e-12)
-
-
 def test_ground_remembers_where_the_body_was():
     effect = DisturbedGround(radius=0.05, weakening=1.0)
     fresh = effect.begin(None, Site(0, 0.0, np.zeros((3, 2)), ()))
@@ -250,16 +240,6 @@ def test_a_track_beside_half_an_element_takes_half_of_that_sides_drag():
     assert [*left, *right] == pytest.approx([0.5, 1, 1, 1], abs=0.08)
 
 
-def test_the_track_has_no_gaps_along_the_longest_element():
-    """Points are half a radius apart at most, in the middles of equal parts."""
-    problem = straight((), Chain((1, 10)))
-    effect = DisturbedGround(radius=0.03, weakening=1.0)
-    at = effect.points(problem, site_at(0.0, 0.0, 0.0))[:, :, 0]
-    assert np.abs(np.diff(at, axis=0)).max() <= 0.03 / 2
-    between_ends = 2 * problem.sides.elements.half[:, 0] * (1 - 1 / len(at))
-    np.testing.assert_allclose(np.abs(at[-1] - at[0]), between_ends)
-
-
 @pytest.mark.parametrize("name", BODIES)
 def test_cutting_elements_changes_no_force_and_no_moment(name):
     body, rng = BODIES[name], np.random.default_rng(4)
@@ -270,14 +250,6 @@ def test_cutting_elements_changes_no_force_and_no_moment(name):
         for x in (body, Pieces(body, 0.03))
     )
     np.testing.assert_allclose(pieces, whole, atol=1e-7)
-
-
-@pytest.mark.parametrize("depths", [(3.0, 3.0), (0.5, 0.5, 0.5)])
-def test_uniform_depth_changes_nothing(depths):
-    rng = np.random.default_rng(5)
-    problem = GLASS, Chain(), rng.uniform(-1, 1, (20, 2)), rng.normal(size=(20, 2))
-    level = body_velocity(*problem, effects=(DepthProfile(along=depths),)).xi
-    np.testing.assert_allclose(level, body_velocity(*problem).xi, atol=1e-8)
 
 
 def test_ground_that_rises_to_the_left_mirrors_one_to_the_right():
@@ -328,33 +300,23 @@ def test_a_slope_of_depth_rises_where_it_says(effect, pose, side, ends):
 def test_a_body_on_a_slope_against_an_integral_over_points():
     """Every point of the body by its own velocity, by SciPy; pieces count as their centres."""
     effect = Slope(0.35, towards=2.0, repose=0.6, weight=0.3)
-    alpha, alphadot = np.array([0.6, -0.4]), np.array([0.8, 1.1])
-    elements = UNEVEN.motion(alpha[:, None], alphadot[:, None])
-    elements = list(zip(*(x[:, 0] for x in elements)))
+    shapes, down = (np.array([0.6, -0.4]), np.array([0.8, 1.1])), -np.exp(2.0j)
 
     def net(xi):
-        force = np.zeros(3)
-        for c, sn, r_t, r_n, half, _, v_t, v_n, v_w in elements:
-            u_t = v_t + c * xi[0] + sn * xi[1] + r_t * xi[2] + 0 * MIDDLES
-            u_n = v_n + c * xi[1] - sn * xi[0] + r_n * xi[2]
-            u_n = u_n + MIDDLES * (v_w + half * xi[2])
-            down = -np.exp(2.0j) * (c - 1j * sn)
-            d = np.maximum(down.real * u_t + down.imag * u_n, 0.0) / np.hypot(u_t, u_n)
-            share = np.cos(0.35) - d * np.sin(0.35) / np.tan(0.6)
-            f_t, f_n = (share * f for f in GLASS.traction(u_t, u_n))
-            pull = 0.3 * np.sin(0.35) * down
-            f_t, f_n = f_t - pull.real, f_n - pull.imag
-            t, n, w = (2 * half * np.mean(f) for f in (f_t, f_n, MIDDLES * f_n))
-            force += [c * t - sn * n, sn * t + c * n, r_t * t + r_n * n + half * w]
-        return force
+        place, velocity, along = points(UNEVEN, *shapes, xi, middles(8000))
+        downhill = np.maximum((velocity / down).real, 0.0) / np.abs(velocity)
+        share = np.cos(0.35) - downhill * np.sin(0.35) / np.tan(0.6)
+        force = share * drag(GLASS, velocity, along) - 0.3 * np.sin(0.35) * down
+        force = force * UNEVEN.fractions[:, None] / 8000
+        moment = (place.conj() * force).imag.sum()
+        return [force.real.sum(), force.imag.sum(), moment]
 
-    exact = optimize.root(net, np.zeros(3), method="hybr", tol=1e-10)
-    assert exact.success
-    problem = GLASS, UNEVEN, [alpha] * 8, [alphadot] * 8
+    exact = optimize.root(net, np.zeros(3), method="hybr", tol=1e-10).x
+    problem = GLASS, UNEVEN, *([x] * 8 for x in shapes)
     errors = []
     for n in (40, 320, 2560):
         found = time_steps(*problem, effects=(effect,), pieces=n, cycles=1)
-        errors.append(np.abs(found.xi[0] - exact.x).max())
+        errors.append(np.abs(found.xi[0] - exact).max())
     assert errors[2] < 1e-5
     assert errors[1] < errors[0] / 5
     assert errors[2] < errors[1] / 5
@@ -388,15 +350,6 @@ def test_joints_and_gravity_together_do_what_the_ground_takes_up():
     assert abs(gravity) > 0.01 * joints
 
 
-def test_places_run_from_the_tail_to_the_head():
-    problem = straight((EndCaps(radius=0.05, tail=4.0, head=0.0),), Chain((1, 3)))
-    assert problem.sides.station[:, 0] == pytest.approx([1 / 8, 5 / 8])
-    assert problem.points.station[:, 0] == pytest.approx([0, 1])
-    assert problem.points.elements.centres[:, 0] == pytest.approx([-0.5, 0.5])
-    tail, head = problem.points.elements.weight[:, 0]
-    assert tail > head == 0
-
-
 def test_depth_along_a_straight_chain_in_closed_form():
     """In a viscous medium, straight, the tail's link turning: two linear equations for drift and turn. Pieces count as
     their centres."""
@@ -418,59 +371,26 @@ def test_depth_along_a_straight_chain_in_closed_form():
     assert errors[-1] < 2e-5
 
 
-def places_over_the_ground(frame, sled, shares, alpha, xi):
-    """The sled and many points of every link, body lengths, and headings, with the frame moved along xi."""
-    heading = np.concatenate([[0], np.cumsum(alpha)])
-    joints = np.concatenate([[0], np.cumsum(shares * np.exp(1j * heading))])
-    s = (np.arange(4000) + 0.5) / 4000
-    links = joints[:-1, None] + s * (shares * np.exp(1j * heading))[:, None]
-    counts = shares if frame == "mean" else np.arange(1, 4) == int(frame[-1])
-    origin = (counts * (joints[1:] + joints[:-1]) / 2).sum()
-    onto = np.exp(1j * (xi[2] - (counts * heading).sum()))
-    moved = xi[0] + 1j * xi[1]
-    sled = (-sled.distance - origin) * onto + moved
-    return sled, (links - origin) * onto + moved, np.exp(1j * heading) * onto
-
-
-@pytest.mark.parametrize("frame", ["mean", "link-1", "link-3"])
-def test_a_towed_sled_by_an_independent_sum_of_forces(frame):
-    """Every force on the ground, from headings and places by hand and velocities by differences, and the sled's against
-    the way it goes: they and their moments add up to nothing, and the joints put in what friction takes."""
-    sled, h = TowedSled(pull=0.7, distance=0.3), 1e-6
-    body = Chain(UNEVEN.lengths, length=0.4, frame=frame)
-    alpha, alphadot = np.array([0.9, -0.4]), np.array([0.8, 0.5])
+def test_a_towed_sled_by_an_independent_sum_of_forces():
+    """Every force on the ground, and the sled's against the way it goes: they and their moments add up to nothing, and
+    the joints put in what friction takes."""
+    sled, body = TowedSled(pull=0.7, distance=0.3), Chain(UNEVEN.lengths, length=0.4)
+    shapes = np.array([0.9, -0.4]), np.array([0.8, 0.5])
     towing = {"effects": (sled.in_metres(0.4),)}
-    xi = body_velocity(GLASS, body, alpha, alphadot, **towing).checked().xi
-    plain = body_velocity(GLASS, body, alpha, alphadot).xi
-    assert np.abs(xi - plain).max() > 0.02
-    share, speed = body.fractions, xi / [0.4, 0.4, 1.0]
-    before, now, after = (
-        places_over_the_ground(frame, sled, share, alpha + t * alphadot, t * speed)
-        for t in (-h, 0.0, h)
-    )
-    place, links, along = now[0], now[1], now[2][:, None]
-    v, u = ((x - y) / (2 * h) for x, y in zip(after[:2], before[:2]))
-    own = u / along
-    f_t, f_n = GLASS.traction(own.real, own.imag)
-    force = (f_t + 1j * f_n) * along * share[:, None] / 4000
+    xi = body_velocity(GLASS, body, *shapes, **towing).checked().xi
+    speed = xi / [0.4, 0.4, 1.0]
+    place, velocity, along = points(body, *shapes, speed, middles(4000))
+    force = drag(GLASS, velocity, along) * body.fractions[:, None] / 4000
+    behind = np.array([-sled.distance / body.fractions[0]])
+    at, v = (x[0, 0] for x in points(body, *shapes, speed, behind)[:2])
     pull = sled.pull * v / abs(v)
     assert abs(force.sum() + pull) < 2e-4
-    assert abs((links.conj() * force).imag.sum() + (place.conj() * pull).imag) < 2e-4
-    work = work_done(GLASS, body, alpha, alphadot, xi, **towing)
-    assert work.bending_moment @ alphadot * 0.4 == pytest.approx(work.power, rel=1e-6)
-    friction = (force.conj() * u).real.sum() + sled.pull * abs(v)
-    assert work.power / body_size(body) == pytest.approx(friction, rel=1e-4)
-
-
-def test_a_sled_far_heavier_than_the_drag_stays_where_it_is():
-    rng = np.random.default_rng(8)
-    body = Chain(UNEVEN.lengths, frame="link-1")
-    problem = GLASS, body, rng.uniform(-1, 1, (10, 2)), rng.normal(size=(10, 2))
-    sled = (TowedSled(pull=1000.0),)
-    x, y, turn = body_velocity(*problem, effects=sled).checked().xi.T
-    tail = -0.5 / 3.2
-    assert np.abs([x, y + tail * turn]).max() < 1e-5
-    assert np.abs(turn).min() > 0.01
+    assert abs((place.conj() * force).imag.sum() + (at.conj() * pull).imag) < 2e-4
+    work = work_done(GLASS, body, *shapes, xi, **towing)
+    by_joints = work.bending_moment @ shapes[1]
+    assert by_joints == pytest.approx(work.power / 0.4, rel=1e-6)
+    friction = (force.conj() * velocity).real.sum() + sled.pull * abs(v)
+    assert by_joints == pytest.approx(friction, rel=1e-4)
 
 
 @dataclasses.dataclass(frozen=True)

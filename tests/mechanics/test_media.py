@@ -116,7 +116,9 @@ def speed_ratio(along):
     return c.mean() - brentq(thrust, 0.0, 1.0, xtol=1e-14)
 
 
-@pytest.mark.parametrize(("along", "ratio"), [*zip(SURFACE_ALONG_RANGE, (0.783, 0.739))])
+@pytest.mark.parametrize(
+    ("along", "ratio"), [*zip(SURFACE_ALONG_RANGE, (0.783, 0.739))]
+)
 def test_surface_drag_carries_the_snakes_it_was_measured_for(along, ratio):
     """.74 and .78 at the ends of the assumed range of the drag along, where their animals have .81 (.74 to .89) and a
     body without slip .829. The drag is that of the fit in newtons."""

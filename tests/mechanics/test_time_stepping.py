@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from by_hand import drag, middles, points
 from registry import BODIES, MEDIA
 from scipy.integrate import solve_ivp
 from tabled import tabled
@@ -30,11 +31,9 @@ from rft import (
     Viscous,
     body_velocity,
     time_steps,
-    work_done,
 )
 from rft.bodies.base import body_size
 from rft.core.refusal import Refusal
-from rft.formulas.se2 import compose, exp
 from rft.motion import limit_cycle
 
 pytestmark = pytest.mark.usefixtures("fastest")
@@ -66,46 +65,33 @@ def test_without_effects_time_stepping_is_the_balance(medium, body):
     np.testing.assert_allclose(march.xi, balance.xi, atol=1e-8)
 
 
-def points_of_links(gait, t, theta):
-    """Directions of three links at phase t, and positions and velocities (3, 60) of their pieces about the centre of
-    mass, while the first link has the heading theta and keeps it."""
-    heading = theta + np.concatenate([[0.0], np.cumsum(gait.shape(t))])
-    turn = np.concatenate([[0.0], np.cumsum(gait.rate(t))])
-    unit = np.exp(1j * heading)
-    along = unit[:, None] * ((np.arange(60) + 0.5) / 60 - 0.5) / 3
-    place = (np.cumsum(unit) - unit / 2)[:, None] / 3 + along
-    velocity = (np.cumsum(1j * turn * unit) - 1j * turn * unit / 2)[:, None] / 3
-    velocity = velocity + 1j * turn[:, None] * along
-    return unit, place - place.mean(), velocity - velocity.mean()
-
-
 def newton(medium, inertia, gait, cycles, eps):
-    """The three-link swimmer on the ground by world momenta: x, y, heading of the first link and both momenta, by an
-    adaptive integrator; forces by the midpoints of fine pieces. Shares nothing with the march but the force law.
+    """The three-link swimmer on the ground by world momenta: place and mean heading, and both momenta, by an adaptive
+    integrator; forces at the middles of fine pieces. Shares nothing with the march but the force law.
 
-    Returns the motion of the centre of mass and mean heading in every cycle."""
+    Returns the motion in every cycle."""
+    body, share, still = Chain(), middles(60), np.zeros(3)
 
     def rate(t, y):
-        unit, place, velocity = points_of_links(gait, t, y[2])
-        # Momenta of the centre of mass and about it give its velocity and the turning of the first link.
+        place, own, along = points(body, gait.shape(t), gait.rate(t), still, share)
+        onto = np.exp(1j * y[2])
+        # Momenta of the centre of mass and about it give its velocity and the turning of the body.
         v = y[3] + 1j * y[4]
-        own = np.mean((place.conj() * velocity).imag)
-        spin = (y[5] - own) / np.mean(np.abs(place) ** 2)
-        flow = (v + 1j * spin * place + velocity) * unit.conj()[:, None]
-        f_t, f_n = medium.traction(flow.real, flow.imag, eps)
-        force = -(f_t + 1j * f_n) * unit[:, None] / inertia
+        spin = y[5] - np.mean((place.conj() * own).imag)
+        spin = spin / np.mean(np.abs(place) ** 2)
+        velocity = v / onto + 1j * spin * place + own
+        force = -drag(medium, velocity, along, eps) / inertia
         moment = np.mean((place.conj() * force).imag)
-        return [v.real, v.imag, spin, force.mean().real, force.mean().imag, moment]
+        force = force.mean() * onto
+        return [v.real, v.imag, spin, force.real, force.imag, moment]
 
-    to_mean = gait.shape(0.0) @ [2 / 3, 1 / 3]
-    _, place, velocity = points_of_links(gait, 0.0, -to_mean)
-    start = [0, 0, -to_mean, 0, 0, np.mean((place.conj() * velocity).imag)]
+    place, own, _ = points(body, gait.shape(0.0), gait.rate(0.0), still, share)
+    start = [0, 0, 0, 0, 0, np.mean((place.conj() * own).imag)]
     times = 2 * np.pi * np.arange(cycles + 1)
     span = 0, times[-1]
     found = solve_ivp(rate, span, start, "LSODA", times, rtol=1e-8, atol=1e-10)
-    assert found.success
     x, y, theta = found.y[:3]
-    z = np.diff(x + 1j * y) * np.exp(-1j * (theta[:-1] + to_mean))
+    z = np.diff(x + 1j * y) * np.exp(-1j * theta[:-1])
     return np.stack([z.real, z.imag, np.diff(theta)], -1)
 
 
@@ -192,43 +178,6 @@ def test_with_mass_the_joints_work_on_the_ground_in_the_mean(medium, phases):
     np.testing.assert_allclose(
         work.bending_moment, other.bending_moment[:, ::-1], atol=2e-3 * largest
     )
-
-
-@pytest.mark.parametrize(
-    ("medium", "accuracy"), [(GLASS, 1e-3), (Viscous(2.0), 1e-7)]
-)  # work rounds kinks as at its own speed
-def test_moments_of_a_heavy_body_move_its_elements(medium, accuracy):
-    """Beside what the medium asks for, at a joint: the moment of d(momentum)/dt of all on the tail's side, by hand over
-    the ground, with the differences in time of the march, from the poses it foresees by the velocities before."""
-    body = Chain((1, 1.4, 0.8), frame="link-1")
-    alpha, alphadot = HEAVY.cycle(32)
-    options = {"effects": (heavy(3.0),), "cycles": 1, "tolerance": 1e-13}
-    found = time_steps(medium, body, alpha, alphadot, with_work=True, **options)
-    dt = 2 * np.pi / 32
-    mean_velocity = 1.5 * found.xi[1:-1] - 0.5 * found.xi[:-2]
-    mean_velocity = np.concatenate([found.xi[:1], mean_velocity])
-    ahead = compose(found.pose[:-2], exp(dt * mean_velocity))
-    x, y, theta = np.concatenate([found.pose[:1], ahead]).T
-    frame = np.exp(1j * theta)
-    motion = body.motion(alpha.T, alphadot.T)
-    along = frame * (motion.c + 1j * motion.s)
-    place = x + 1j * y + frame * motion.centres
-    v_x, v_y, turn = found.xi.T
-    velocity = (motion.v[0] + 1j * motion.v[1]) * along
-    velocity = velocity + frame * (v_x + 1j * v_y + 1j * turn * motion.centres)
-    spin = motion.v[2] / motion.half + turn
-    p = 2 * motion.half * velocity
-    L = (place.conj() * p).imag + 2 * motion.half**3 / 3 * spin
-
-    def rate(q):
-        return 3.0 * (1.5 * q[:, 2:] - 2 * q[:, 1:-1] + 0.5 * q[:, :-2]) / dt
-
-    joints = (place + motion.half * along)[:-1, 2:]
-    force = np.cumsum(rate(p), 0)[:-1]
-    wanted = (joints.conj() * force).imag - np.cumsum(rate(L), 0)[:-1]
-    still = work_done(medium, body, alpha, alphadot, found.xi).bending_moment
-    moment = (found.work.bending_moment - still)[2:].T
-    np.testing.assert_allclose(moment, wanted, atol=accuracy * np.abs(wanted).max())
 
 
 def test_cycles_that_do_not_repeat_are_not_taken_for_periodic():
