@@ -426,7 +426,8 @@ def solutions(medium, body, alpha, alphadot, regularisation, starts):
         sizes = [[0.3], [0.3], [1.0]] * 10.0 ** rng.uniform(-4, 0, starts)
         guess = rng.normal(size=(3, starts)) * sizes
         descent = Descent(widest, 0.1, 1e-4, np.inf, 100.0)
-        *xi, residual, _, _ = solve(problem, descent, limits, guess)
+        with np.errstate(all="ignore"):  # some starts lead nowhere
+            *xi, residual, _, _ = solve(problem, descent, limits, guess)
         for one in np.transpose(xi)[residual <= limits.residual]:
             distances = np.abs(found - one).max(-1, initial=0.0)
             if (distances > 10 * regularisation).all():
