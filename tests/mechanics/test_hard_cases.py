@@ -423,9 +423,10 @@ def solutions(medium, body, alpha, alphadot, regularisation, starts):
     problem, limits = assembly.problem(*shapes), Limits(regularisation, 1e-10)
     found = np.zeros((0, 3))
     for widest in (0.0, 1e-4, 1e-3, 1e-2):
-        sizes = [[0.3], [0.3], [1.0]] * 10.0 ** rng.uniform(-4, 0, starts)
-        guess = rng.normal(size=(3, starts)) * sizes
-        descent = Descent(widest, 0.1, 1e-4, np.inf, 100.0)
+        guess = rng.normal(size=(3, starts)) * [[0.3], [0.3], [1.0]]
+        guess *= 10.0 ** rng.uniform(-4, 0, starts)
+        first = max(widest, regularisation)
+        descent = Descent(first, 0.1, 1e-4, np.inf, 100.0)
         with np.errstate(all="ignore"):  # some starts lead nowhere
             *xi, residual, _, _ = solve(problem, descent, limits, guess)
         for one in np.transpose(xi)[residual <= limits.residual]:
