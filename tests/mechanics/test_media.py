@@ -6,7 +6,6 @@ import math
 import numpy as np
 import pytest
 from registry import MEDIA
-from scipy.optimize import brentq
 
 from geomech.mathematics.gaits import Circle
 from geomech.studies.mechanics.undulation import endless_efficiency
@@ -99,23 +98,6 @@ def newtons(v_t, v_n, along):
     return along * v_t, 0.15 * (1 + 0.198 / math.sqrt(0.00389 + v_n * v_n)) * v_n
 
 
-def speed_ratio(along):
-    """Speed of the centre over that along the track, of an endless sine-generated wave of 48.4 degrees.
-
-    Points slide at speed 1 along a curve that itself drifts backwards at the speed ``drift``.
-    """
-    phases = 2 * math.pi * (np.arange(400) + 0.5) / 400
-    headings = math.radians(48.4) * np.sin(phases)
-    c, s = np.cos(headings), np.sin(headings)
-
-    def thrust(drift):
-        forces = [newtons(1 - drift * x, drift * y, along) for x, y in zip(c, s)]
-        f_t, f_n = np.transpose(forces)
-        return f_n @ s - f_t @ c
-
-    return c.mean() - brentq(thrust, 0.0, 1.0, xtol=1e-14)
-
-
 @pytest.mark.parametrize(
     ("along", "ratio"), [*zip(SURFACE_ALONG_RANGE, (0.783, 0.739))]
 )
@@ -132,7 +114,6 @@ def test_surface_drag_carries_the_snakes_it_was_measured_for(along, ratio):
     assert no_slip == pytest.approx(0.829, abs=5e-4)
     found = no_slip * endless_efficiency(law, headings)
     assert found == pytest.approx(ratio, abs=5e-4)
-    assert found == pytest.approx(speed_ratio(along), abs=1e-6)
 
 
 def test_a_body_of_eight_waves_goes_as_the_endless_one():
