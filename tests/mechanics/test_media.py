@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 from registry import MEDIA
+from test_loads import CubicDrag
 
 from geomech.mathematics.gaits import Circle
 from geomech.studies.mechanics.undulation import endless_efficiency
@@ -89,6 +90,10 @@ def test_axial_stress_is_k_times_pressure(name, k, packed):
 
 def test_every_medium_has_its_source():
     assert all(entry.source for entry in CATALOGUE.values())
+
+
+def test_a_law_of_ones_own_has_the_power_of_speed_that_its_tractions_show():
+    assert base.speed_exponent(CubicDrag()) == pytest.approx(1 / 3, abs=1e-5)
 
 
 def newtons(v_t, v_n, along):
