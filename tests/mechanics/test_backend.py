@@ -1,5 +1,6 @@
-"""Compiled descents against NumPy's: the same marches under every effect (the same answers for every medium and body:
-tests/mechanics/test_hard_cases.py); and which of the two is taken."""
+"""Compiled descents against NumPy's: the same marches under every effect (the same
+answers for every medium and body: tests/mechanics/test_hard_cases.py); and which of the
+two is taken."""
 
 import dataclasses
 import errno
@@ -88,8 +89,9 @@ class Both(TermLaw):
 
 @pytest.mark.parametrize("medium", [GLASS, Both()], ids=["dry", "both"])
 def test_starts(solved_by, medium):
-    """From the answer, from one nearby, from nonsense and from rest: the same answers and statuses, and few steps from a
-    good one. Asymmetric body, length not 1, rates from slow to fast, a viscous part in which speed counts."""
+    """From the answer, from one nearby, from nonsense and from rest: the same answers
+    and statuses, and few steps from a good one. Asymmetric body, length not 1, rates
+    from slow to fast, a viscous part in which speed counts."""
     rng = np.random.default_rng(11)
     alpha = rng.uniform(-2.6, 2.6, (90, 2))
     alphadot = rng.normal(size=(90, 2)) * 10.0 ** rng.uniform(-3, 3, (90, 1))
@@ -264,7 +266,7 @@ def test_auto_is_compiled_code_unless_something_else_is_preferred(
 
 @dataclasses.dataclass(frozen=True)
 class Quartic:
-    """f_t = v_t / |v|, f_n = v_n / |v| (1 + extra (v_n / |v|)^4): a law of one's own."""
+    """f_t = v_t / |v|, f_n = v_n / |v| (1 + extra (v_n / |v|)^4): a custom law."""
 
     extra: float = 3.0
     mirror = True
@@ -278,8 +280,8 @@ class Quartic:
 
 @dataclasses.dataclass(frozen=True)
 class Softening(Effect):
-    """Grains that an element slides through lose drag, to half after a travel in body lengths: an effect of one's own
-    with a past."""
+    """Grains that an element slides through lose drag, to half after a travel in body
+    lengths: an effect of one's own with a past."""
 
     travel: float
 
@@ -298,8 +300,8 @@ class Softening(Effect):
 
 
 class Turtle:
-    """A body of one's own: a trunk of 0.6 with two flippers of 0.2 at its head, whose angles to the trunk are the
-    joints."""
+    """A body of one's own: a trunk of 0.6 with two flippers of 0.2 at its head, whose
+    angles to the trunk are the joints."""
 
     joints, length = 2, 1.0
 
@@ -319,7 +321,8 @@ class Turtle:
     ids=len,
 )
 def test_what_somebody_else_writes_runs_by_both(effects):
-    """A law, an effect with a past and a body: balance, stepping, displacement and work, the same digits."""
+    """A law, an effect with a past and a body: balance, stepping, displacement and
+    work, the same digits."""
     problem = Quartic(), Turtle(), *GAIT.cycle(16, np.array([0.4, 0.9]))
     options = {"effects": sized(effects, Turtle()), "cycles": 2, "with_work": True}
     plain, fast = (time_steps(*problem, **options, backend=b) for b in BOTH)
@@ -371,7 +374,8 @@ def doubled(x):
 
 @pytest.fixture
 def small(tmp_path, monkeypatch):
-    """(a function that compiles `doubled`, or loads it, and tells whether it was loaded, where it is kept)."""
+    """(a function that compiles `doubled`, or loads it, and tells whether it was
+    loaded, where it is kept)."""
     numba = pytest.importorskip("numba")
     from rft.balance.cache import Cache
 
@@ -395,7 +399,8 @@ def test_compiled_code_is_kept_in_one_file(small):
 @compiled
 @pytest.mark.parametrize("reached", ["half", "formulas.half"])
 def test_code_has_another_key_once_a_function_that_it_names_changes(reached):
-    """By its own name, and as that of a module; what the module has besides does not count."""
+    """By its own name, and as that of a module; what the module has besides does not
+    count."""
     from rft.balance.cache import digest
 
     def key(share, unused=1.0):

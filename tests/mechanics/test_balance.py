@@ -1,4 +1,4 @@
-"""Body velocities: closed form, an independent solver, symmetries, status, bad input."""
+"""Body velocities: closed form, an independent solver, symmetries, status."""
 
 import numpy as np
 import pytest
@@ -101,14 +101,16 @@ def test_mirror_and_reversal(medium):
 
 
 def test_the_body_that_stays_put():
-    """alpha = (1.5, 1.5), both joints driven alike: the middle link does not move, the others only turn."""
+    """alpha = (1.5, 1.5), both joints driven alike: the middle link does not move, the
+    others only turn."""
     solution = body_velocity(GLASS, Chain(frame="link-2"), [1.5, 1.5], [1.0, 1.0])
     assert solution.status == "stuck"
     assert np.abs(solution.xi).max() < 3e-6
 
 
 def test_stuck_is_slower_than_ten_times_the_regularisation():
-    """By the slowest element's faster end, from the velocities themselves; links between 5 and 20 times it are met."""
+    """By the slowest element's faster end, from the velocities themselves; links
+    between 5 and 20 times it are met."""
     rng = np.random.default_rng(5)
     alpha, alphadot = rng.uniform(-2.8, 2.8, (3000, 2)), rng.normal(size=(3000, 2))
     alphadot /= np.linalg.norm(alphadot, axis=1, keepdims=True)
@@ -143,7 +145,7 @@ def test_batches_broadcast_and_keep_their_shape():
 
 
 class Steps:
-    """A law that ignores the rounding: its balance has no solution between its steps."""
+    """A law without rounding: its balance has no solution between its steps."""
 
     def traction(self, v_t, v_n, rounding=0.0):
         return np.sign(v_t), 3 * np.sign(v_n)
@@ -160,8 +162,8 @@ def test_a_balance_that_is_not_solved_says_so():
 @pytest.mark.parametrize("speed", [1e-6, 0.3, 5.0, 1e9])
 @pytest.mark.parametrize(("loads", "rtol"), [("exact", 1e-4), ("gauss:40", 5e-3)])
 def test_yield_stress_and_viscosity_together(speed, loads, rtol):
-    """At the true velocities, by far more nodes on each link; kinks in links cost Gauss digits. Slowly one is a yield
-    stress, fast a viscous medium."""
+    """At the true velocities, by far more nodes on each link; kinks in links cost Gauss
+    digits. Slowly one is a yield stress, fast a viscous medium."""
     alpha, alphadot = np.array([[0.5, -0.9]]), np.array([[1.0, 0.4]])
     found = body_velocity(Mud(), THREE, alpha, speed * alphadot, loads=loads).checked()
     v_t, v_n, v_w = element_velocities(THREE, alpha, speed * alphadot, found.xi)

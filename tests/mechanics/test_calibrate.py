@@ -1,4 +1,5 @@
-"""Laws fitted to drag: parameters, covariance and band against closed forms; the sample; what is no drag is refused."""
+"""Laws fitted to drag: parameters, covariance and band against closed forms; the
+sample; what is no drag is refused."""
 
 import dataclasses
 import math
@@ -116,7 +117,8 @@ def test_axial_drag_is_told_as_far_as_sizes_are_known(rod, name, size):
 
 
 def by_hand(found: Fit, psi):
-    """(2, N, 3): slopes of both forces in C, gamma0 and k, from Eq. 3 differentiated on paper."""
+    """(2, N, 3): slopes of both forces in C, gamma0 and k, from Eq. 3 differentiated on
+    paper."""
     (C, g, k), s, c = found.values, np.sin(psi), np.cos(psi)
     root = np.sqrt(math.tan(g) ** 2 + s**2)
     across = UNIT * np.array(
@@ -166,8 +168,9 @@ def test_covariance_and_band_are_those_of_the_law_linearised():
 
 
 def test_intervals_of_few_forces_hold_as_often_as_they_say():
-    """95 and 68 % of the noise, spread evenly over its distribution, with two degrees of freedom; twice the standard error
-    and one of it would hold the true value in 82 and 58 %."""
+    """95 and 68 % of the noise, spread evenly over its distribution, with two degrees
+    of freedom; twice the standard error and one of it would hold the true value in 82
+    and 58 %."""
     noise = 0.02 * norm.ppf(qmc.Sobol(4, seed=1).random_base2(6)).reshape(-1, 2, 2)
     held, near = [], []
     for some in noise:
@@ -189,7 +192,8 @@ def test_intervals_of_few_forces_hold_as_often_as_they_say():
 
 
 def test_no_other_start_ends_lower():
-    """Against the best of a fine scan of gamma0, in which C and the axial drag are linear least squares."""
+    """Against the best of a fine scan of gamma0, in which C and the axial drag are
+    linear least squares."""
     for seed in range(6):
         rng = np.random.default_rng(seed)
         medium = Granular(
@@ -248,8 +252,8 @@ def test_angles_are_folded_by_symmetry():
 
 
 def test_end_caps():
-    """Fitted, fixed or left out: the ends' forces as DESIGN of the effect has them, e = 1.6 for both together, over the
-    projected area of the side."""
+    """Fitted, fixed or left out: the ends' forces as DESIGN of the effect has them, e =
+    1.6 for both together, over the projected area of the side."""
     (C, g), e = (1.8, 0.24), 1.6
     v = np.cos(np.radians(PSI)), np.sin(np.radians(PSI))
     area = e * math.pi * 0.007**2 / (2 * 0.007 * 0.09)
@@ -334,21 +338,55 @@ def test_a_row_that_weighs_nothing_is_as_good_as_none_however_wrong(tmp_path):
 @pytest.mark.parametrize(
     ("lines", "sizes"),
     [
-        (["radius = 8 mm, length = 80 mm, depth = 30 mm, density = 605 kg/m^3"], (0.008, 0.08, 0.03, 605)),
-        (["radius_mm: 8", "length_m = .08", "depth cm: 3", "bulk density 0.605 g/cm3, packing 0.6"], (0.008, 0.08, 0.03, 605)),
-        (["radius: 0.008", "length = 0.08", "depth: 0.03", "density 1,605"], (0.008, 0.08, 0.03, 1605)),
         (
-            ["Rod radius 8 mm and length 80 mm at a depth of 3 cm in beads of diameter 0.3 mm, density 2500 kg/m3, volume "
-             "fraction 58 %"], (0.008, 0.08, 0.03, 1450),
+            ["radius = 8 mm, length = 80 mm, depth = 30 mm, density = 605 kg/m^3"],
+            (0.008, 0.08, 0.03, 605),
         ),
-        (["grain diameter 0.3 mm", "rod diameter 16 mm, 8 cm long, 30 mm deep"], (0.008, 0.08, 0.03, None)),
-        (["16 mm diameter rod, 80 mm long, in 6 mm beads at 30 mm depth"], (0.008, 0.08, 0.03, None)),
-        (["rod 16 mm diameter x 80 mm; bed 20 cm deep; density of the rod 2700 kg/m^3"], (0.008, 0.08, None, None)),
-        (["effective radius 8 mm", "density 2500 kg/m^3, packing density 0.6, void fraction 0.4"], (0.008, None, None, 1500)),
+        (
+            [
+                "radius_mm: 8",
+                "length_m = .08",
+                "depth cm: 3",
+                "bulk density 0.605 g/cm3, packing 0.6",
+            ],
+            (0.008, 0.08, 0.03, 605),
+        ),
+        (
+            ["radius: 0.008", "length = 0.08", "depth: 0.03", "density 1,605"],
+            (0.008, 0.08, 0.03, 1605),
+        ),
+        (
+            [
+                "Rod radius 8 mm and length 80 mm at a depth of 3 cm in beads of diameter 0.3 mm, density 2500 kg/m3, volume "
+                "fraction 58 %"
+            ],
+            (0.008, 0.08, 0.03, 1450),
+        ),
+        (
+            ["grain diameter 0.3 mm", "rod diameter 16 mm, 8 cm long, 30 mm deep"],
+            (0.008, 0.08, 0.03, None),
+        ),
+        (
+            ["16 mm diameter rod, 80 mm long, in 6 mm beads at 30 mm depth"],
+            (0.008, 0.08, 0.03, None),
+        ),
+        (
+            [
+                "rod 16 mm diameter x 80 mm; bed 20 cm deep; density of the rod 2700 kg/m^3"
+            ],
+            (0.008, 0.08, None, None),
+        ),
+        (
+            [
+                "effective radius 8 mm",
+                "density 2500 kg/m^3, packing density 0.6, void fraction 0.4",
+            ],
+            (0.008, None, None, 1500),
+        ),
         (["radius 8000 um, length 8 cm"], (0.008, 0.08, None, None)),
         (["nothing", "mean after 30 mm of travel, 0.1 m/s"], (None, None, None, None)),
     ],
-)  # fmt: skip
+)
 def test_sizes_of_header_lines(lines, sizes):
     found = drag.sizes(Rows("f", "", 1, (), [], lines))
     names = ("radius", "length", "depth", "density")
@@ -379,7 +417,8 @@ def test_the_medium_written_is_the_one_fitted(law, tmp_path):
 
 
 def test_what_repeats_scatter_by_is_told_with_the_freedom_that_their_means_leave():
-    """Of three angles, one of them once and one thrice: three of six rows are free, in two components."""
+    """Of three angles, one of them once and one thrice: three of six rows are free, in
+    two components."""
     psi = np.array([0.2, 0.5, 0.2, 0.9, 0.5, 0.5])
     off = [[1.0, 3.0, -1.0, 0.0, 0.0, -3.0], [-2.0, 1.0, 2.0, 0.0, -2.0, 1.0]]
     forces = np.array([[5.0], [7.0]]) + psi * [[2.0], [-3.0]] + off

@@ -1,4 +1,5 @@
-"""Measured centrelines: what was measured comes back, to the order claimed; bad files are refused by line."""
+"""Measured centrelines: what was measured comes back, to the order claimed; bad files
+are refused by line."""
 
 import contextlib
 import dataclasses
@@ -22,7 +23,8 @@ HEADERS = {"curvature": "t,s,curvature", "points": "t,x,y", "numbered": "t,point
 
 
 def sine_curvature(t, s, amplitude):
-    """rad per body length of the wave of `Sine` at s (0 tail, 1 head), one wave on the body."""
+    """rad per body length of the wave of `Sine` at s (0 tail, 1 head), one wave on the
+    body."""
     slope = 2 * np.pi * amplitude
     p = arc_to_phase(2 * np.pi * s + t, slope)
     arc = np.sqrt(1 + slope**2) * 4 * ellipe(slope**2 / (1 + slope**2))
@@ -36,7 +38,8 @@ def sine_points(t, s, amplitude):
 
 
 def rows(kind, count=32, places=40, amplitude=0.1, noise=0.0, phases=None, seed=0):
-    """Rows of one period of a sine, period 1; midlines somewhere else, turned, in every frame, 80 mm or so long."""
+    """Rows of one period of a sine, period 1; midlines somewhere else, turned, in every
+    frame, 80 mm or so long."""
     rng, s = np.random.default_rng(seed), np.linspace(0, 1, places)
     for share in np.arange(count) / count if phases is None else phases:
         if kind == "curvature":
@@ -78,7 +81,7 @@ def gait(path, **options):
 
 
 def off(path, amplitude=0.1, joints=slice(None), **options):
-    """Largest error of the bends against `Sine`, as curvature in rad per body length."""
+    """Largest error of the bends against `Sine`, as curvature, rad per body length."""
     exact = Sine(amplitude=amplitude, elements=ELEMENTS).shape(T)
     return np.abs(gait(path, **options).shape(T) - exact)[:, joints].max() * ELEMENTS
 
@@ -128,7 +131,8 @@ def test_displacement_is_that_of_the_sine(kind, sandfish, tmp_path):
 
 @pytest.mark.parametrize(("kind", "noise"), [("curvature", 0.5), ("points", 1e-3)])
 def test_smoothing_recovers_the_displacement(kind, noise, sandfish, tmp_path):
-    """Noise of 5 % of the largest curvature, or of a thousandth of the body in every point; rms of two trials."""
+    """Noise of 5 % of the largest curvature, or of a thousandth of the body in every
+    point; rms of two trials."""
     scene, exact = sandfish
     sizes = {"count": 64, "places": 50, "amplitude": 0.2, "noise": noise}
     paths = [write(tmp_path, kind, name=f"{k}.csv", seed=k, **sizes) for k in range(2)]
@@ -150,8 +154,9 @@ def parabola(share, s):
 
 
 def test_smoothing_is_least_squares(tmp_path):
-    """With data in the span of the modes the fit is exact, and noise is left with its share of the degrees of freedom,
-    three modes times three functions of time among all the numbers."""
+    """With data in the span of the modes the fit is exact, and noise is left with its
+    share of the degrees of freedom, three modes times three functions of time among all
+    the numbers."""
     phases = np.sort(np.random.default_rng(1).uniform(0, 1, 80))
     share, places = np.repeat(phases, 60), np.tile(np.linspace(0, 1, 60), 80)
     exact, noise = parabola(share, places), np.random.default_rng(2).normal(size=4800)
@@ -162,7 +167,8 @@ def test_smoothing_is_least_squares(tmp_path):
         )
         for values in (exact, exact + 0.5 * noise)
     )
-    # The mean of a parabola over an element on either side is its value and 1/24 of its second derivative.
+    # The mean of a parabola over an element on either side is its value and 1/24 of its
+    # second derivative.
     told = parabola(T[:, None] / (2 * np.pi), np.arange(1, ELEMENTS) / ELEMENTS)
     told -= 6 * np.sin(T[:, None]) / 24 / ELEMENTS**2
     np.testing.assert_allclose(clean * ELEMENTS, told, atol=1e-10)
@@ -190,7 +196,8 @@ def test_modes_of_points_are_those_of_curvature(tmp_path):
     [{}, {"reverse": True}, {"keep_harmonics": 4, "keep_modes": 6, "reverse": True}],
 )
 def test_it_is_a_gait(options, tmp_path):
-    """Closed, with rates that are derivatives, in proportion to its amplitude, and backwards in reverse."""
+    """Closed, with rates that are derivatives, in proportion to its amplitude, and
+    backwards in reverse."""
     path = write(tmp_path, "points", amplitude=0.2)
     made = gait(path, amplitude=0.7, **options)
     slope = (made.shape(T + 1e-5) - made.shape(T - 1e-5)) / 2e-5
@@ -208,7 +215,8 @@ def test_it_is_a_gait(options, tmp_path):
 def test_order_of_rows_and_marks_of_the_editor_do_not_matter(kind, tmp_path):
     path = write(tmp_path, kind)
     plain, (comment, header, *lines) = gait(path).shape(T), path.read_text().split("\n")
-    # Without numbers the order within a frame is all there is: every frame's first row, every frame's second ...
+    # Without numbers the order within a frame is all there is: every frame's first row,
+    # every frame's second ...
     across = np.reshape(lines[:-1], (32, 40)).T.ravel()
     mixed = across if kind == "points" else np.random.default_rng(0).permutation(across)
     path.write_bytes(
@@ -221,7 +229,8 @@ def test_order_of_rows_and_marks_of_the_editor_do_not_matter(kind, tmp_path):
     ("repeats", "period"), [(True, None), (True, 1.0), (False, 1.0)]
 )
 def test_ways_to_give_the_period(repeats, period, tmp_path):
-    """By a frame that repeats the first, or as an option; in any unit of time, from any start."""
+    """By a frame that repeats the first, or as an option; in any unit of time, from any
+    start."""
     table = list(rows("points"))
     plain = gait(write(tmp_path, "points", table)).shape(T)
     table += later(table[:40], 1.0) * repeats
@@ -326,7 +335,8 @@ def later(table, by):
 
 
 def with_repeats(count, more):
-    """Rows of two periods and a part of a third, or of one and a part, at so many frames a period."""
+    """Rows of two periods and a part of a third, or of one and a part, at so many
+    frames a period."""
 
     def edit(table):
         periods = [*table, *later(table, 1.0)] if more > 1 else table
@@ -338,39 +348,91 @@ def with_repeats(count, more):
 PHASES = np.arange(12) / 12
 POINTS = edited("points", list)
 BAD = {  # what makes the file, options, and what is said
-    "point lost": (edited("numbered", lambda t: [*t[:15], *t[16:]]), {}, "line 15: the frame .* has no point = 4"),
-    "point twice": (edited("numbered", lambda t: [*t, t[3]]), {}, "line 147: t = 0, point = 4 is given twice"),
+    "point lost": (
+        edited("numbered", lambda t: [*t[:15], *t[16:]]),
+        {},
+        "line 15: the frame .* has no point = 4",
+    ),
+    "point twice": (
+        edited("numbered", lambda t: [*t, t[3]]),
+        {},
+        "line 147: t = 0, point = 4 is given twice",
+    ),
     "few places": (
-        edited("curvature", without(lambda row: 0.1 < row[1] < 0.99)), {}, "line 3: .* t = 0 has 3 values of s"
+        edited("curvature", without(lambda row: 0.1 < row[1] < 0.99)),
+        {},
+        "line 3: .* t = 0 has 3 values of s",
     ),
     "many frames": (
-        lambda path: path.write_text("t,s,curvature\n" + "".join(f"{t},0,0\n" for t in range(10001))), {},
+        lambda path: path.write_text(
+            "t,s,curvature\n" + "".join(f"{t},0,0\n" for t in range(10001))
+        ),
+        {},
         "4 to 10000 .*got 10001",
     ),
-    "length": (edited("points", lambda t: [*t[:24], *t[28:]]), {}, "line 27: the midline at t = 0.1666.* is 0.6"),
+    "length": (
+        edited("points", lambda t: [*t[:24], *t[28:]]),
+        {},
+        "line 27: the midline at t = 0.1666.* is 0.6",
+    ),
     "turned round": (
-        edited("points", lambda t: [*t[:36], *t[36:48][::-1], *t[48:]]), {}, "t = 0.25 seems to run from head to tail"
+        edited("points", lambda t: [*t[:36], *t[36:48][::-1], *t[48:]]),
+        {},
+        "t = 0.25 seems to run from head to tail",
     ),
     "half": (edited("points", lambda t: t[:84]), {}, "the gait does not close"),
-    "not closed": (edited("points", lambda t: t[:84]), {"period": 0.55}, "the gait does not close"),
-    "uneven": (edited("points", without(lambda row: row[0] == 0.25)), {}, "not equally spaced in t: give period"),
-    "nearly": (edited("points", list, phases=[*PHASES * 0.985, 0.985]), {}, "all but repeats .*give period"),
+    "not closed": (
+        edited("points", lambda t: t[:84]),
+        {"period": 0.55},
+        "the gait does not close",
+    ),
+    "uneven": (
+        edited("points", without(lambda row: row[0] == 0.25)),
+        {},
+        "not equally spaced in t: give period",
+    ),
+    "nearly": (
+        edited("points", list, phases=[*PHASES * 0.985, 0.985]),
+        {},
+        "all but repeats .*give period",
+    ),
     "same time": (
-        edited("points", list, phases=[*PHASES, 1e-9]), {"period": 1.0}, "after t = 0 comes at almost the same"
+        edited("points", list, phases=[*PHASES, 1e-9]),
+        {"period": 1.0},
+        "after t = 0 comes at almost the same",
     ),
     "two": (
-        edited("points", lambda t: [*t, *later(t, 1.0)]), {},
+        edited("points", lambda t: [*t, *later(t, 1.0)]),
+        {},
         "the body does the same again after 1 in t, 2 times in the period of 2: give the",
     ),
     "two and repeated": (
-        edited("numbered", lambda t: [*t, *later(t, 1.0), *later(t[:12], 2.0)]), {"period": 2.0}, "2 times in the"
+        edited("numbered", lambda t: [*t, *later(t, 1.0), *later(t[:12], 2.0)]),
+        {"period": 2.0},
+        "2 times in the",
     ),
     "two and a half": (with_repeats(8, 1.5), {}, "2.5 times in the period of 2.5"),
-    "one and a half": (with_repeats(8, 0.5), {}, "the frame at t = 1 repeats the first, and 3 more"),
-    "one and a quarter": (with_repeats(16, 0.25), {}, "the frame at t = 1 repeats the first, and 3 more come"),
-    "few elements": (POINTS, {"elements": 2}, "elements must be a whole number from 3 to 2000"),
-    "half an element": (POINTS, {"elements": 3.5}, "elements must be a whole number from 3 to 2000"),
-}  # fmt: skip
+    "one and a half": (
+        with_repeats(8, 0.5),
+        {},
+        "the frame at t = 1 repeats the first, and 3 more",
+    ),
+    "one and a quarter": (
+        with_repeats(16, 0.25),
+        {},
+        "the frame at t = 1 repeats the first, and 3 more come",
+    ),
+    "few elements": (
+        POINTS,
+        {"elements": 2},
+        "elements must be a whole number from 3 to 2000",
+    ),
+    "half an element": (
+        POINTS,
+        {"elements": 3.5},
+        "elements must be a whole number from 3 to 2000",
+    ),
+}
 
 
 @pytest.mark.parametrize("name", BAD)
@@ -444,7 +506,21 @@ def test_what_an_estimate_leaves_out_is_told(tmp_path):
     assert "error_is" not in plain.attributes
 
 
-VALUES = ["nan", "", "0", "-1", "1e12", "1e-320", "0.5", "x", "1,2", "#", "0.0833333333333", "1e400", "٣"]  # fmt: skip
+VALUES = [
+    "nan",
+    "",
+    "0",
+    "-1",
+    "1e12",
+    "1e-320",
+    "0.5",
+    "x",
+    "1,2",
+    "#",
+    "0.0833333333333",
+    "1e400",
+    "٣",
+]
 
 
 def mutated(rng, text):
@@ -460,7 +536,8 @@ def mutated(rng, text):
 
 
 def test_mutated_files_run_or_are_refused(tmp_path):
-    """Any warning is an error in the tests: nothing but a gait or a ValueError of one line comes out."""
+    """Any warning is an error in the tests: nothing but a gait or a ValueError of one
+    line comes out."""
     rng, said = np.random.default_rng(0), []
     for k in range(60):
         path = write(tmp_path, list(HEADERS)[k % 3], count=8, places=6)

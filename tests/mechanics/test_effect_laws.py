@@ -1,4 +1,5 @@
-"""The laws behind effects, each against a closed form, its own equation or a far finer computation."""
+"""The laws behind effects, each against a closed form, its own equation or a far finer
+computation."""
 
 import dataclasses
 
@@ -64,8 +65,8 @@ def test_end_caps_are_the_written_formula():
 
 
 def test_skin_friction_scales_the_drag_along_by_the_way_it_slides():
-    """Forward over reference where an element slides towards its head, backward towards its tail; the drag across
-    stays."""
+    """Forward over reference where an element slides towards its head, backward towards
+    its tail; the drag across stays."""
     a, m, w = np.random.default_rng(6).normal(size=(3, 3, 40))
     skin = SkinFriction(forward=0.12, backward=0.31, reference=0.25)
     factor = Factor(*(np.ravel(x) for x in straight((skin,)).sides.factor))
@@ -93,7 +94,8 @@ def test_squared_speed_is_integrated_exactly():
 
 
 def with_shares(left, right):
-    """Load of elements on ground that leaves these shares of the drag across to either side."""
+    """Load of elements on ground that leaves these shares of the drag across to either
+    side."""
     memory = NO_MEMORY._replace(intact_left=left, intact_right=right)
 
     def load(a, m, w, eps):
@@ -103,8 +105,8 @@ def with_shares(left, right):
 
 
 def test_sides_are_parts_of_the_whole():
-    """Left and right are the drag across of positive and of negative velocities; along the body nothing is taken
-    away."""
+    """Left and right are the drag across of positive and of negative velocities; along
+    the body nothing is taken away."""
     rng = np.random.default_rng(2)
     v = rng.normal(size=(3, 4, 50))
     v[1, 0], v[2, 1] = 0.0, 0.0
@@ -123,8 +125,8 @@ def test_sides_are_parts_of_the_whole():
 
 
 def after_steps(effect, before, now, dt):
-    """Mean directions along and across of one element (steps + 1, 2), its past at rest, from its velocities (steps, 2)
-    at the beginning and end of each step."""
+    """Mean directions along and across of one element (steps + 1, 2), its past at rest,
+    from its velocities (steps, 2) at the beginning and end of each step."""
     states = [np.zeros((2, 1, 1))]
     for steps in zip(before, now):
         v, after = (np.reshape([*x, 0.0], (3, 1, 1)) for x in steps)
@@ -134,7 +136,8 @@ def after_steps(effect, before, now, dt):
 
 
 def test_transients_follow_their_equation():
-    """dm/dt = 3 |u| (sign(u) - m) / travel along and across by solve_ivp at 1e-10, of order 2 in the step."""
+    """dm/dt = 3 |u| (sign(u) - m) / travel along and across by solve_ivp at 1e-10, of
+    order 2 in the step."""
     effect, t_end = Transient(travel=0.4, ratio=0.6), 7.0
 
     def v(t):
@@ -164,7 +167,8 @@ def test_transients_follow_their_equation():
     ids=["across", "along"],
 )
 def test_a_rod_to_and_fro_bears_the_drag_of_the_closed_form(row, travel, at_once):
-    """Shares after two reversals as `rft.grains.reversal` fits them to grains; little is lost after a short way back."""
+    """Shares after two reversals as `rft.grains.reversal` fits them to grains; little
+    is lost after a short way back."""
     effect = Transient(travel=0.3, at_once=0.1, ratio=0.4, at_once_along=0.6)
     a, dx = 0.2, 0.01
     way = np.arange(1, 81) * dx
@@ -194,7 +198,8 @@ def test_ground_remembers_where_the_body_was():
     fresh = effect.begin(None, Site(0, 0.0, np.zeros((3, 2)), ()))
     ground = effect.with_track(fresh, np.array([[0.3 + 0.2j, 0.0]]))
     later = effect.with_track(ground, np.array([[4.3 + 0.2j, 0.0]]))
-    # On the axis, and not in the other sample's ground; far off; half a radius aside; on
+    # On the axis, and not in the other sample's ground; far off; half a radius aside;
+    # on
     # the same cells a whole map further; a patch that another one has taken over.
     for state, places, disturbed in (
         (ground, (0.3 + 0.2j, 0.3 + 0.2j), [1, 0]),
@@ -209,13 +214,15 @@ def test_ground_remembers_where_the_body_was():
 
 
 def shares(effect, problem, site, ground):
-    """What an effect leaves of the drag across, to the left and to the right, (2, n, B)."""
+    """What an effect leaves of the drag across, to the left and to the right, (2, n,
+    B)."""
     memory = effect.apply(problem, site, ground).memory
     return np.stack([memory.intact_left, memory.intact_right])
 
 
 def test_a_body_that_finds_fresh_ground_is_not_weakened():
-    """The first steps of a straight-ahead chain: its own track lies behind and under it, not at its sides."""
+    """The first steps of a straight-ahead chain: its own track lies behind and under
+    it, not at its sides."""
     effect = DisturbedGround(radius=0.03, weakening=1.0)
     problem = straight((), subdivide(Chain((1, 1, 1)), 40))
     at_place, aside = site_at(0.0, 0.0, 0.0), site_at(0.0, 0.06, 0.0)
@@ -298,7 +305,8 @@ def test_a_slope_of_depth_rises_where_it_says(effect, pose, side, ends):
 
 
 def test_a_body_on_a_slope_against_an_integral_over_points():
-    """Every point of the body by its own velocity, by SciPy; pieces count as their centres."""
+    """Every point of the body by its own velocity, by SciPy; pieces count as their
+    centres."""
     effect = Slope(0.35, towards=2.0, repose=0.6, weight=0.3)
     shapes, down = (np.array([0.6, -0.4]), np.array([0.8, 1.1])), -np.exp(2.0j)
 
@@ -351,8 +359,8 @@ def test_joints_and_gravity_together_do_what_the_ground_takes_up():
 
 
 def test_depth_along_a_straight_chain_in_closed_form():
-    """In a viscous medium, straight, the tail's link turning: two linear equations for drift and turn. Pieces count as
-    their centres."""
+    """In a viscous medium, straight, the tail's link turning: two linear equations for
+    drift and turn. Pieces count as their centres."""
     nodes, weights = np.polynomial.legendre.leggauss(40)
     own, drift = np.zeros(2), np.zeros((2, 2))
     for low, high, rate in ((-1 / 2, -1 / 6, -1.0), (-1 / 6, 1 / 2, 0.0)):
@@ -372,8 +380,8 @@ def test_depth_along_a_straight_chain_in_closed_form():
 
 
 def test_a_towed_sled_by_an_independent_sum_of_forces():
-    """Every force on the ground, and the sled's against the way it goes: they and their moments add up to nothing, and
-    the joints put in what friction takes."""
+    """Every force on the ground, and the sled's against the way it goes: they and their
+    moments add up to nothing, and the joints put in what friction takes."""
     sled, body = TowedSled(pull=0.7, distance=0.3), Chain(UNEVEN.lengths, length=0.4)
     shapes = np.array([0.9, -0.4]), np.array([0.8, 0.5])
     towing = {"effects": (sled.in_metres(0.4),)}

@@ -1,4 +1,5 @@
-"""Effects: what each one is, that it vanishes at its limit, that it commutes with others, what it takes away."""
+"""Effects: what each one is, that it vanishes at its limit, that it commutes with
+others, what it takes away."""
 
 import dataclasses
 import functools
@@ -41,8 +42,8 @@ KINDS_BY_NAME = [name for name in EFFECTS if "," not in name]
 
 
 def at_its_limit(effect):
-    """The effect with no more changed than the limit it declares asks for: "x = 0", "x = y = z" or "x all 1", joined by
-    "and"."""
+    """The effect with no more changed than the limit it declares asks for: "x = 0", "x
+    = y = z" or "x all 1", joined by "and"."""
     changes = {}
     for clause in effect.limit.split(" and "):
         name, every, value = clause.partition(" all ")
@@ -107,7 +108,8 @@ def test_parameters_that_may_differ_within_a_batch(name):
 
 @pytest.mark.parametrize("name", EFFECTS)
 def test_effects_are_the_same_on_a_body_of_any_size(name):
-    """Lengths of an effect are of the body or its own: body lengths in, body lengths out."""
+    """Lengths of an effect are of the body or its own: body lengths in, body lengths
+    out."""
     effect = EFFECTS[name][0](0.3)
     options = {"cycles": 2, "phases": 12, "tolerance": 1e-13, "with_work": True}
     one, small = (
@@ -173,9 +175,9 @@ def test_a_radius_longer_than_a_link_or_far_shorter_is_noted(radius):
 
 @pytest.mark.parametrize("name", EFFECTS)
 def test_effects_vanish_at_their_limit(name):
-    """At the declared order over six decades, in the mean, pivots inside links and links at rest included. Of a
-    transient, which feels all of what reverses and links that come to rest as they do, the order is that of its
-    docstring."""
+    """At the declared order over six decades, in the mean, pivots inside links and
+    links at rest included. Of a transient, which feels all of what reverses and links
+    that come to rest as they do, the order is that of its docstring."""
     make, order = EFFECTS[name]
     steps = {"phases": 32 if name == "transient" else 16, "cycles": 2, "pieces": 12}
     sizes = [1e-2, 1e-3, 1e-4, 1e-6]
@@ -312,8 +314,9 @@ def test_a_body_that_comes_to_the_surface_is_refused():
     ],
 )
 def test_grain_inertia_takes_the_grains_own_pressure(packing, k):
-    """The quadratic drag is lambda rho v_n^2 over k rho g |z|: with k = 2.5 in loose glass, 5.1 in close, one's own
-    where one is given, and 2.5 where nobody says, which is said."""
+    """The quadratic drag is lambda rho v_n^2 over k rho g |z|: with k = 2.5 in loose
+    glass, 5.1 in close, one's own where one is given, and 2.5 where nobody says, which
+    is said."""
     medium = CATALOGUE[f"glass-0.3mm-{packing}"].medium
     given = {"frequency": 2.0, "length": 0.3, "depth": 0.05, "strength": 1.5}
     speed = 0.7 * 0.3 * 2 * np.pi * 2.0  # m/s, of 0.7 body lengths per rad

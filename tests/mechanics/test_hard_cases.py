@@ -1,4 +1,5 @@
-"""Hard cases by name, crossed with every law and body of the registry: a new one meets them all on its first day."""
+"""Hard cases by name, crossed with every law and body of the registry: a new one meets
+them all on its first day."""
 
 import dataclasses
 
@@ -78,7 +79,8 @@ STRANGE_BODIES = {
 
 
 def hard(joints, ill):
-    """Names, alpha and alphadot of all samples of HARD; those at random are for bodies that are not badly conditioned."""
+    """Names, alpha and alphadot of all samples of HARD; those at random are for bodies
+    that are not badly conditioned."""
     names = [name for name in HARD if not ill or name != "at random"]
     problems = [
         np.broadcast_arrays(*map(np.atleast_2d, HARD[name](joints))) for name in names
@@ -101,9 +103,10 @@ ILL_CONDITIONED = ("a millionth of a link", "twelve")
 
 @pytest.mark.parametrize("name", BODIES | STRANGE_BODIES)
 def test_hard_cases(name):
-    """By NumPy, three links in every medium, the others in some; and compiled code gives the same, to 1e-10. A link
-    of a millionth, or twelve that lie upon each other, make a balance so badly conditioned at the usual regularisation that
-    its residual leaves the sixth digit open; there the two are compared at a wider one."""
+    """By NumPy, three links in every medium, the others in some; and compiled code
+    gives the same, to 1e-10. A link of a millionth, or twelve that lie upon each other,
+    make a balance so badly conditioned at the usual regularisation that its residual
+    leaves the sixth digit open; there the two are compared at a wider one."""
     body, ill = (BODIES | STRANGE_BODIES)[name], name in ILL_CONDITIONED
     backends = ("numpy", "numba") if backend.installed() else ("numpy",)
     for label, medium in (
@@ -164,14 +167,16 @@ def test_from_two_to_two_hundred_links(links, medium):
 
 
 def test_isotropic_viscous_drag_moves_nothing():
-    """Ratio 1: the drag is proportional to the momentum of a uniform body, so its centre stays where it is."""
+    """Ratio 1: the drag is proportional to the momentum of a uniform body, so its
+    centre stays where it is."""
     for gait in (Circle(), Butterfly()):
         g = direct(lambda a, d: body_velocity(Viscous(1.0), Chain(), a, d).xi, gait)
         assert np.abs(g[:2]).max() < 1e-15
 
 
 def least_slip(body, alpha, alphadot):
-    """The body velocity with the least mean square of velocities across, along all elements."""
+    """The body velocity with the least mean square of velocities across, along all
+    elements."""
     motion = body.motion(alpha[:, None], alphadot[:, None])
     weight = np.sqrt(np.concatenate([motion.half, motion.half / 3]))[:, 0]
     slips = []
@@ -184,7 +189,8 @@ def least_slip(body, alpha, alphadot):
 
 
 def test_large_ratios_approach_the_kinematic_limit():
-    """Ratio -> infinity: the body moves so that the mean square of sideways slip is least, order 1 in 1/ratio."""
+    """Ratio -> infinity: the body moves so that the mean square of sideways slip is
+    least, order 1 in 1/ratio."""
     rng, body = np.random.default_rng(3), Chain((1, 2, 1), frame="link-2")
     alpha, alphadot = rng.uniform(0.5, 2.0, (20, 2)), rng.normal(size=(20, 2))
     limit = [least_slip(body, *shape) for shape in zip(alpha, alphadot)]
@@ -208,7 +214,8 @@ def test_tiny_gaits_keep_their_digits(amplitude):
 
 
 def test_tiny_gaits_in_sand():
-    """Displacement per area settles as the circle shrinks, down to a millionth of a radian."""
+    """Displacement per area settles as the circle shrinks, down to a millionth of a
+    radian."""
     radii = np.array([1e-2, 1e-3, 1e-4, 1e-5, 1e-6])
     g = direct(
         lambda a, d: body_velocity(GLASS, Chain((1, 1, 1.1)), a, d).checked().xi,
@@ -258,8 +265,8 @@ def test_stuck_samples_approach_the_limit_monotonically(medium):
 
 @pytest.mark.parametrize("medium", ["glass-0.3mm-loose", "coulomb", "sharp"])
 def test_the_status_is_that_of_the_limit(medium):
-    """Stuck or sliding is decided at 1e-6 as it is ten thousand times nearer to the limit, but for links about to
-    slip."""
+    """Stuck or sliding is decided at 1e-6 as it is ten thousand times nearer to the
+    limit, but for links about to slip."""
     rng = np.random.default_rng(12)
     alpha, alphadot = rng.uniform(-2.8, 2.8, (4000, 2)), rng.normal(size=(4000, 2))
     near, limit = (
@@ -271,8 +278,8 @@ def test_the_status_is_that_of_the_limit(medium):
 
 @pytest.mark.parametrize("ratio", [1e4, 1e6])
 def test_velocities_keep_digits_at_large_ratios(ratio):
-    """Forces cancel to 1e-14 of the largest, so residuals grow with the ratio; velocities
-    of the mirrored body, of other roundoff, stay equal."""
+    """Forces cancel to 1e-14 of the largest, so residuals grow with the ratio;
+    velocities of the mirrored body, of other roundoff, stay equal."""
     alpha, alphadot = np.random.default_rng(1).uniform(-2.8, 2.8, (2, 200, 2))
     found, mirrored = (
         body_velocity(Granular(ratio, 0.24), Chain(), sign * alpha, sign * alphadot)
@@ -297,7 +304,8 @@ def test_sliding_velocities_are_near_their_limit(medium):
     assert (change > 10).mean() < 0.01
 
 
-# Curves of solutions that fold on the way to the wanted rounding: a descent that only lowers it falls off.
+# Curves of solutions that fold on the way to the wanted rounding: a descent that only
+# lowers it falls off.
 FOLDS = {
     "uneven": (
         (
@@ -339,7 +347,8 @@ FOLDS = {
 
 
 def in_all_frames(medium, body, alpha, alphadot):
-    """(xi, solution) in every link's frame, xi told in the mean frame; the mean frame's own first."""
+    """(xi, solution) in every link's frame, xi told in the mean frame; the mean frame's
+    own first."""
     mean = dataclasses.replace(body, frame="mean")
     found = body_velocity(medium, mean, alpha, alphadot)
     yield found.xi, found
@@ -381,7 +390,8 @@ def test_neighbours_of_folds(name):
 
 
 def hard_problem(rng, count):
-    """Laws that are far from monotone, and half of the rates along the axis of a joint, or nearly."""
+    """Laws that are far from monotone, and half of the rates along the axis of a joint,
+    or nearly."""
     links = rng.integers(3, 6)
     frame = ("mean", f"link-{rng.integers(1, links + 1)}")[rng.integers(2)]
     body = Chain(tuple(10.0 ** rng.uniform(-1, 0.3, links)), frame=frame)
@@ -415,7 +425,8 @@ def test_the_frame_does_not_matter():
 
 
 def solutions(medium, body, alpha, alphadot, regularisation, starts):
-    """Body velocities (k, 3), in the mean frame per |alphadot|, that Newton's method finds from random starts."""
+    """Body velocities (k, 3), in the mean frame per |alphadot|, that Newton's method
+    finds from random starts."""
     rng = np.random.default_rng(6)
     rates = np.divide(alphadot, np.linalg.norm(alphadot))
     shapes = (np.array(x)[:, None] * np.ones(starts) for x in (alpha, rates))
@@ -438,8 +449,9 @@ def solutions(medium, body, alpha, alphadot, regularisation, starts):
 
 @pytest.mark.parametrize(("regularisation", "count"), [(1.5e-4, 3), (1e-6, 1)])
 def test_between_folds_there_are_three_solutions(regularisation, count):
-    """And the one on the curve's first part is taken, which slides most: the curve comes from wide rounding, where the
-    body hardly feels its kinks. At the usual rounding there is one."""
+    """And the one on the curve's first part is taken, which slides most: the curve
+    comes from wide rounding, where the body hardly feels its kinks. At the usual
+    rounding there is one."""
     (medium, body), shapes = FOLDS["uneven"]
     problem = medium, dataclasses.replace(body, frame="mean"), *shapes
     taken = body_velocity(*problem, regularisation=regularisation).xi
@@ -476,7 +488,8 @@ def random_problem(rng, count):
     ("problem", "batches"), [(random_problem, 400), (hard_problem, 1600)]
 )
 def test_a_million_random_problems(problem, batches, backend):
-    """Media and bodies, 500 samples each, to a normalised residual of 1e-10: prints rows of .docs/validation.md."""
+    """Media and bodies, 500 samples each, to a normalised residual of 1e-10: prints
+    rows of .docs/validation.md."""
     rng = np.random.default_rng(2026)
     residuals, iterations, stuck, failures = [], [], 0, 0
     for _ in range(batches):
@@ -498,8 +511,8 @@ def test_a_million_random_problems(problem, batches, backend):
 
 @pytest.mark.soak
 def test_no_sample_has_several_solutions():
-    """A thousand starts at each of forty samples that no descent solves, and at the folds above: one solution each, and
-    it is the one that is taken."""
+    """A thousand starts at each of forty samples that no descent solves, and at the
+    folds above: one solution each, and it is the one that is taken."""
     rng, samples = np.random.default_rng(8), [(*law, *at) for law, at in FOLDS.values()]
     while len(samples) < 40 + len(FOLDS):
         medium, body, alpha, alphadot = hard_problem(rng, 500)

@@ -1,4 +1,5 @@
-"""The exact link integral against 50-digit arithmetic and quadrature; derivatives; orders of the quadratures."""
+"""The exact link integral against 50-digit arithmetic and quadrature; derivatives;
+orders of the quadratures."""
 
 import mpmath as mp
 import numpy as np
@@ -41,7 +42,8 @@ def on_one(load, a, m, w, eps):
 
 
 def test_over_sixteen_decades():
-    """Every ratio of a, m, w from 1e-16 to 1, signs mixed: relative error below 1e-13 of each force."""
+    """Every ratio of a, m, w from 1e-16 to 1, signs mixed: relative error below 1e-13
+    of each force."""
     rng = np.random.default_rng(1)
     samples = rng.choice([-1.0, 1.0], (600, 3)) * 10.0 ** rng.uniform(-16, 0, (600, 3))
     samples[::10, 2] = samples[::10, 1]  # the pivot at the link's end

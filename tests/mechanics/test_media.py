@@ -38,7 +38,8 @@ def test_granular_is_equation_3():
 
 @pytest.mark.parametrize("name", MEDIA)
 def test_what_a_medium_claims_is_so(name):
-    """Left and right alike, odd, linear, one power of the speed: yes or no, as its tractions have it."""
+    """Left and right alike, odd, linear, one power of the speed: yes or no, as its
+    tractions have it."""
     law, v = MEDIA[name], (np.cos(DIRECTIONS), np.sin(DIRECTIONS))
     f, back, left, fast = (
         np.stack(law.traction(a * v[0], b * v[1]))
@@ -66,7 +67,8 @@ def test_media_drag_at_any_speed_and_rest_at_rest(name):
 
 
 def test_loose_glass_agrees_with_its_sources():
-    """As in the paper, and as fitted: the printed form, which the paper's numbers are near to."""
+    """As in the paper, and as fitted: the printed form, which the paper's numbers are
+    near to."""
     loose, fitted = (CATALOGUE[f"glass-0.3mm-loose{x}"].medium for x in ("", "-fitted"))
     assert loose == Granular(1.8, math.radians(13.8), k=2.5)
     psi = np.linspace(0, np.pi / 2, 50)
@@ -81,7 +83,8 @@ def test_loose_glass_agrees_with_its_sources():
     [("loose", 2.5, 0.58), ("loose-fitted", 2.56, 0.58), ("close", 5.09, 0.62)],
 )
 def test_axial_stress_is_k_times_pressure(name, k, packed):
-    """k rho g |z| at the fitted depth, of glass at 2500 kg/m^3; the paper's k = 2.5 gives nearly the fitted one."""
+    """k rho g |z| at the fitted depth, of glass at 2500 kg/m^3; the paper's k = 2.5
+    gives nearly the fitted one."""
     entry = CATALOGUE[f"glass-0.3mm-{name}"]
     assert entry.medium.k == pytest.approx(k, abs=0.005)
     pressure = packed * 2500 * 9.81 * 0.0762
@@ -97,7 +100,8 @@ def test_a_law_of_ones_own_has_the_power_of_speed_that_its_tractions_show():
 
 
 def newtons(v_t, v_n, along):
-    """Force (N) along and across the plate of Schiebel et al., as printed; along times v.t for the force along it."""
+    """Force (N) along and across the plate of Schiebel et al., as printed; along times
+    v.t for the force along it."""
     speed = math.hypot(v_t, v_n)
     v_t, v_n = v_t / speed, v_n / speed
     return along * v_t, 0.15 * (1 + 0.198 / math.sqrt(0.00389 + v_n * v_n)) * v_n
@@ -107,8 +111,9 @@ def newtons(v_t, v_n, along):
     ("along", "ratio"), [*zip(SURFACE_ALONG_RANGE, (0.783, 0.739))]
 )
 def test_surface_drag_carries_the_snakes_it_was_measured_for(along, ratio):
-    """.74 and .78 at the ends of the assumed range of the drag along, where their animals have .81 (.74 to .89) and a
-    body without slip .829. The drag is that of the fit in newtons."""
+    """.74 and .78 at the ends of the assumed range of the drag along, where their
+    animals have .81 (.74 to .89) and a body without slip .829. The drag is that of the
+    fit in newtons."""
     law = dataclasses.replace(SURFACE, across=0.15 / along)
     for psi in DIRECTIONS:
         wanted = np.array(newtons(math.cos(psi), math.sin(psi), along)) / along
@@ -142,7 +147,8 @@ def test_limits(law, limit):
 
 
 class Law(TermLaw):
-    """Terms of one's own; compared by value and not hashable, as a dataclass is by default."""
+    """Terms of one's own; compared by value and not hashable, as a dataclass is by
+    default."""
 
     __hash__ = None
 
@@ -151,7 +157,8 @@ class Law(TermLaw):
 
 
 class Tilted:
-    """No terms: traction alone. It drags but for motion about 45 degrees to the left, faster than 1e3."""
+    """No terms: traction alone. It drags but for motion about 45 degrees to the left,
+    faster than 1e3."""
 
     dry = viscous = None
     mirror = False

@@ -1,4 +1,5 @@
-"""Systems without drag: chains whose momentum is zero, and the differential drive, against sums of their own."""
+"""Systems without drag: chains whose momentum is zero, and the differential drive,
+against sums of their own."""
 
 import numpy as np
 import pytest
@@ -26,9 +27,10 @@ SWIMMER = IdealFluidSwimmer(
 
 
 def test_afloat_three_equal_rods_turn_as_by_hand():
-    """About the centre of mass angular momentum is sum I w + sum over pairs of m r_ij x v_ij / 3, with r_12 = l (e_1 + e_2) / 2
-    and so on; in units of m l^2 / 12, w being the links' turning rates and c their angles' cosines, that is
-    w_1 (3 + 3 c_1 + c_12) + w_2 (7 + 3 c_1 + 3 c_2) + w_3 (3 + 3 c_2 + c_12)."""
+    """About the centre of mass angular momentum is sum I w + sum over pairs of m r_ij x
+    v_ij / 3, with r_12 = l (e_1 + e_2) / 2 and so on; in units of m l^2 / 12, w being
+    the links' turning rates and c their angles' cosines, that is w_1 (3 + 3 c_1 + c_12)
+    + w_2 (7 + 3 c_1 + 3 c_2) + w_3 (3 + 3 c_2 + c_12)."""
     alpha, alphadot = np.random.default_rng(0).uniform(-3, 3, (2, 50, 2))
     (c1, c2), c12 = np.cos(alpha).T, np.cos(alpha.sum(-1))
     ahead, behind = 3 + 3 * c1 + c12, 3 + 3 * c2 + c12
@@ -43,7 +45,8 @@ def test_afloat_three_equal_rods_turn_as_by_hand():
 
 @pytest.mark.parametrize("aspect", [0.05, 0.4, 1.0])
 def test_straight_ellipses_start_as_by_hand(aspect):
-    """Middle link: across 3 mu v + mu l / 2 (a_1 + a_2) = 0, about 2 mu l^2 w + 3 i w = (mu l^2 / 2 + i) (a_1 - a_2)."""
+    """Middle link: across 3 mu v + mu l / 2 (a_1 + a_2) = 0, about 2 mu l^2 w + 3 i w =
+    (mu l^2 / 2 + i) (a_1 - a_2)."""
     link = 0.7 / 3
     a, b = link / 2, aspect * link / 2
     mu = np.pi * a * b + np.pi * a**2
@@ -56,9 +59,10 @@ def test_straight_ellipses_start_as_by_hand(aspect):
 
 @pytest.mark.parametrize("aspect", [0.1, 0.6])
 def test_added_masses_are_those_of_the_flow_around_an_ellipse(aspect):
-    """On the ellipse the stream function is that of the body's motion; outside of it the potential phi + i psi is a series
-    sum a_k exp(-i k t) on the boundary, by conformal mapping, and the fluid's energy is pi / 2 sum k |a_k|^2. Links have
-    the half axis 1 / 2, in units of pi."""
+    """On the ellipse the stream function is that of the body's motion; outside of it
+    the potential phi + i psi is a series sum a_k exp(-i k t) on the boundary, by
+    conformal mapping, and the fluid's energy is pi / 2 sum k |a_k|^2. Links have the
+    half axis 1 / 2, in units of pi."""
     t = 2 * np.pi * np.arange(64) / 64
     x, y = np.cos(t) / 2, aspect * np.sin(t) / 2
     stream = np.array([y, -x, (x**2 + y**2) / 2])
@@ -70,8 +74,9 @@ def test_added_masses_are_those_of_the_flow_around_an_ellipse(aspect):
 
 
 def impulses(motion, masses, inertia):
-    """Linear and angular impulse of chain and fluid in the world (phases, 3), its scale, and twice the kinetic energy, from
-    the links' ends by differences of order 8. inertia: (along, across, about) of each link, in the world's units."""
+    """Linear and angular impulse of chain and fluid in the world (phases, 3), its
+    scale, and twice the kinetic energy, from the links' ends by differences of order 8.
+    inertia: (along, across, about) of each link, in the world's units."""
     ends, step, weights = (
         motion.points(),
         motion.phase[1],
@@ -102,7 +107,8 @@ def impulses(motion, masses, inertia):
 
 
 def own(system):
-    """Masses, and inertia of each link in the world's units, written out anew from the fields."""
+    """Masses, and inertia of each link in the world's units, written out anew from the
+    fields."""
     x = body_size(system) * np.array(system.lengths) / sum(system.lengths)
     if isinstance(system, FloatingChain):
         m = np.array(system.masses) / sum(system.masses)
@@ -120,7 +126,8 @@ def own(system):
 @pytest.mark.parametrize("frame", ["mean", "link-1", "link-3"])
 @pytest.mark.parametrize("system", [AFLOAT, SWIMMER], ids=lambda s: s.kind)
 def test_momentum_is_conserved_in_the_world(system, frame):
-    """Over two cycles, whatever the frame; and `cost` is twice the kinetic energy that is seen."""
+    """Over two cycles, whatever the frame; and `cost` is twice the kinetic energy that
+    is seen."""
     system = in_frame(system, frame)
     masses, inertia, unit = own(system)
     found = moving.compute_motion(Scene(system, OVAL, Numerics(phases=256)), 2)
@@ -156,7 +163,8 @@ def test_heavy_links_are_afloat():
 
 @pytest.mark.parametrize("system", [AFLOAT, SWIMMER], ids=lambda s: s.kind)
 def test_cost_is_a_metric(system):
-    """Quadratic in alphadot and positive; the same in every frame; and `metric.fit` takes it."""
+    """Quadratic in alphadot and positive; the same in every frame; and `metric.fit`
+    takes it."""
     alpha, alphadot = np.random.default_rng(4).uniform(-2.5, 2.5, (2, 20, 2))
     cost = system.squared_speed(alpha, alphadot)
     assert (cost > 0).all()
@@ -177,7 +185,8 @@ def test_the_cart_drives_as_by_hand():
 
 
 def test_the_cart_goes_aside_by_the_area_of_a_circle_of_its_wheels():
-    """Its CCF is -r^2 / track; heading is known in closed form, and the way is its integral."""
+    """Its CCF is -r^2 / track; heading is known in closed form, and the way is its
+    integral."""
     circle = Circle(amplitude=0.8, centre=(0.3, 1.0))
     tables = SceneTables(Scene(CART, circle, Numerics(grid=9, extent=20.0)))
     ccf = np.moveaxis(tables.curvature.values, 0, -1)

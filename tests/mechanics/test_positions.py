@@ -1,4 +1,5 @@
-"""Bodies from a function of shape that returns the poses of links: against chains and backbones that are built in."""
+"""Bodies from a function of shape that returns the poses of links: against chains and
+backbones that are built in."""
 
 import pickle
 
@@ -23,14 +24,16 @@ ALPHA, RATE = RNG.uniform(-2, 2, (2, 2, 40))
 
 
 def hinged(alpha):
-    """Three links seen from the middle one, one shape at a time; the tail's heading is wrapped."""
+    """Three links seen from the middle one, one shape at a time; the tail's heading is
+    wrapped."""
     back, front = -alpha[0] + 4 * np.pi, alpha[1]
     tail = [-(1 + np.cos(back)) / 2, -np.sin(back) / 2, back]
     return [tail, [0, 0, 0], [(1 + np.cos(front)) / 2, np.sin(front) / 2, front]]
 
 
 def uneven(alpha):
-    """Links from the tail on, many shapes at once, in an own frame that turns and moves with the shape."""
+    """Links from the tail on, many shapes at once, in an own frame that turns and moves
+    with the shape."""
     theta = np.concatenate([0 * alpha[..., :1], np.cumsum(alpha, -1)], -1) + np.sin(
         alpha[..., :1]
     )

@@ -1,4 +1,5 @@
-"""The march: equation of motion against an independent integrator, orders in the step, limit cycles, hard cases."""
+"""The march: equation of motion against an independent integrator, orders in the step,
+limit cycles, hard cases."""
 
 import numpy as np
 import pytest
@@ -66,8 +67,9 @@ def test_without_effects_time_stepping_is_the_balance(medium, body):
 
 
 def newton(medium, inertia, gait, cycles, eps):
-    """The three-link swimmer on the ground by world momenta: place and mean heading, and both momenta, by an adaptive
-    integrator; forces at the middles of fine pieces. Shares nothing with the march but the force law.
+    """The three-link swimmer on the ground by world momenta: place and mean heading,
+    and both momenta, by an adaptive integrator; forces at the middles of fine pieces.
+    Shares nothing with the march but the force law.
 
     Returns the motion in every cycle."""
     body, share, still = Chain(), middles(60), np.zeros(3)
@@ -75,7 +77,8 @@ def newton(medium, inertia, gait, cycles, eps):
     def rate(t, y):
         place, own, along = points(body, gait.shape(t), gait.rate(t), still, share)
         onto = np.exp(1j * y[2])
-        # Momenta of the centre of mass and about it give its velocity and the turning of the body.
+        # Momenta of the centre of mass and about it give its velocity and the turning
+        # of the body.
         v = y[3] + 1j * y[4]
         spin = y[5] - np.mean((place.conj() * own).imag)
         spin = spin / np.mean(np.abs(place) ** 2)
@@ -135,8 +138,9 @@ def test_order_two_in_the_step(effects, fewest, truths):
 
 
 def test_transients_slow_the_sandfish():
-    """A travel of a fifth of the wave's amplitude costs 9 % of the speed; that resistive force theory exceeds
-    discrete-element simulation by 30 %, the most there is, takes half of it (paper Secs. III B, IV A)."""
+    """A travel of a fifth of the wave's amplitude costs 9 % of the speed; that
+    resistive force theory exceeds discrete-element simulation by 30 %, the most there
+    is, takes half of it (paper Secs. III B, IV A)."""
     wave = SANDFISH.gait.amplitude * float(SANDFISH.gait.wavelength())
     head = SANDFISH.system.effects
     slowed = [
@@ -238,7 +242,8 @@ HARD_GAITS = {
 @pytest.mark.parametrize("case", HARD)
 @pytest.mark.parametrize("medium", ["glass-0.3mm-loose", "sharp", "strong"])
 def test_hard_marches_converge(case, medium):
-    """Links that stick, joints that pause, straight bodies and kinks, phase after phase."""
+    """Links that stick, joints that pause, straight bodies and kinks, phase after
+    phase."""
     alpha = np.moveaxis(list(HARD_GAITS.values()), 1, -1)
     alphadot = (np.roll(alpha, -1, 1) - np.roll(alpha, 1, 1)) / (2 * T[1])
     problem = MEDIA[medium], Chain(), alpha, alphadot
@@ -289,7 +294,8 @@ def test_estimates_of_marches_cover_the_truth(effect, truths):
     assert error[:, 1].max() <= 100 * off[:, 1].max() + 1e-4
 
 
-# Of circles in glass, 64 phases, that stick and slip: the changes with half, a quarter and
+# Of circles in glass, 64 phases, that stick and slip: the changes with half, a quarter
+# and
 # an eighth of the phases are small by chance. Net poses of 1024 phases.
 LUCKY = {
     0.4543302326829342: (-0.017186712687, -0.001628653204, -0.011921901768),
@@ -309,7 +315,8 @@ def test_errors_cover_stick_and_slip_of_a_heavy_body():
 
 
 def pieced_scene(rng, kind):
-    """A random chain in a random medium on a random ellipse, with an effect that varies along its links."""
+    """A random chain in a random medium on a random ellipse, with an effect that varies
+    along its links."""
     media = [
         GLASS,
         Viscous(2.0),
@@ -337,7 +344,8 @@ def second_cycle(medium, body, gait, effects, pieces, phases, amplitudes):
 
 
 def errors_over_estimates(scene, pieces, truths):
-    """(3, 2): of three amplitudes, in place and heading, against four times the pieces and phases."""
+    """(3, 2): of three amplitudes, in place and heading, against four times the pieces
+    and phases."""
     a = np.array([0.5, 1.0, 1.4])
     coarse = scene.with_numerics(pieces=pieces, tolerance=1e-9, cycles=2)
     found, error = estimate.direct(coarse, scene.gait, a, 64)
@@ -358,7 +366,8 @@ def test_estimates_cover_what_pieces_leave(kind, seeds, truths):
 @pytest.mark.soak
 @pytest.mark.timeout(3000)
 def test_estimates_cover_what_pieces_leave_of_many_random_chains():
-    """60 scenes of three amplitudes; the row in .docs/validation.md has the first four of each kind."""
+    """60 scenes of three amplitudes; the row in .docs/validation.md has the first four
+    of each kind."""
     ratios = []
     for kind in ("transient", "disturbed", "depth"):
         some = [pieced_scene(np.random.default_rng([7, k]), kind) for k in range(20)]
@@ -386,7 +395,8 @@ def test_a_tolerance_refines_pieces():
 
 
 def test_what_is_left_is_the_sum_of_all_changes_to_come():
-    """Two modes of a massless march, one of either sign, one in heading; the change of each cycle is known."""
+    """Two modes of a massless march, one of either sign, one in heading; the change of
+    each cycle is known."""
     ratio = np.array([0.5, 0.8])
     size = np.array([[1.0, 0.0], [0.0, 0.0], [0.0, -2.0]])
     cycles = limit_cycle.begin(2)
@@ -401,8 +411,8 @@ def test_what_is_left_is_the_sum_of_all_changes_to_come():
 
 
 def test_cells_of_the_ground_do_not_keep_a_march_from_settling():
-    """Changes of displacement as the sandfish's on disturbed ground: they shrink, then come and go at random, sample by
-    sample and in heading most."""
+    """Changes of displacement as the sandfish's on disturbed ground: they shrink, then
+    come and go at random, sample by sample and in heading most."""
     rng = np.random.default_rng(2)
     slow = np.array([0.5, 0.7, 0.8, 0.2, 0.6, 0.3, 0.4])
     cells = np.array([[0.4e-4], [0.9e-4], [3e-4]])
@@ -426,7 +436,8 @@ def last_of(cycles, medium, body, gait, phases, effects):
 
 
 def test_heavy_bodies_know_how_far_they_are(truths):
-    """Plain cycles of a viscous swimmer that forgets slowly: after each, what is left of the way is what is said."""
+    """Plain cycles of a viscous swimmer that forgets slowly: after each, what is left
+    of the way is what is said."""
     problem = Viscous(2.0), UNEVEN, *HEAVY.cycle(16)
     mass = (heavy(20.0),)
     limit = time_steps(*problem, effects=mass).checked()
@@ -472,8 +483,9 @@ def test_estimates_hold_what_is_left_of_the_way():
 
 
 def test_a_kick_that_leads_astray_is_taken_back():
-    """Two samples whose velocity halves its way to (1, -1, 2) in a cycle; one of them is thrown about after its first
-    kick. It goes on from the end of its calmest cycle, and both get there."""
+    """Two samples whose velocity halves its way to (1, -1, 2) in a cycle; one of them
+    is thrown about after its first kick. It goes on from the end of its calmest cycle,
+    and both get there."""
     limit = np.array([[1.0], [-1.0], [2.0]]) * np.ones(2)
 
     def after(cycles, start, end):
@@ -501,8 +513,8 @@ def test_a_kick_that_leads_astray_is_taken_back():
 
 @pytest.mark.parametrize("inertia", [300.0, 400.0])
 def test_no_kick_leads_a_body_astray(inertia):
-    """Drag acts between the step before a kick and the next one; a velocity far from the limit once led to fast
-    spin. The displacement is that of 128 phases."""
+    """Drag acts between the step before a kick and the next one; a velocity far from
+    the limit once led to fast spin. The displacement is that of 128 phases."""
     problem = Viscous(2.0), Chain(), *Circle(amplitude=1.2).cycle(8)
     found = time_steps(*problem, effects=(heavy(inertia),)).checked()
     assert found.cycles <= 45
@@ -520,8 +532,8 @@ def test_heavy_bodies_settle_in_tens_of_cycles(medium, inertia):
 
 
 def random_march(rng):
-    """A medium, a body, a batch of eight closed gaits of 16 phases, and one to four effects; scales over many
-    decades."""
+    """A medium, a body, a batch of eight closed gaits of 16 phases, and one to four
+    effects; scales over many decades."""
 
     def many(low, high):
         return 10 ** rng.uniform(low, high)
@@ -557,8 +569,8 @@ def random_march(rng):
 
 
 def test_fast_spinning_heavy_bodies_are_solved():
-    """Three radians of spin a radian of phase, a third of a radian a step: an equation quadratic in the velocity was
-    not."""
+    """Three radians of spin a radian of phase, a third of a radian a step: an equation
+    quadratic in the velocity was not."""
     rng = np.random.default_rng(2026)
     marches = [random_march(rng) for _ in range(344)]
     for medium, body, alpha, alphadot, effects in (marches[250], marches[343]):
@@ -569,7 +581,8 @@ def test_fast_spinning_heavy_bodies_are_solved():
 @pytest.mark.soak
 @pytest.mark.parametrize("backend", ["numpy", "numba"])
 def test_two_hundred_thousand_steps_of_random_marches(backend):
-    """800 marches of eight gaits, two cycles each, to 1e-10: prints a row of .docs/validation.md."""
+    """800 marches of eight gaits, two cycles each, to 1e-10: prints a row of
+    .docs/validation.md."""
     rng = np.random.default_rng(2026)
     residuals, failures = [], 0
     for _ in range(800):

@@ -1,4 +1,5 @@
-"""Backbones, travelling waves, the sandfish and the snake: progress, cost, slip and activation."""
+"""Backbones, travelling waves, the sandfish and the snake: progress, cost, slip and
+activation."""
 
 import dataclasses
 
@@ -35,7 +36,8 @@ HEAD = SANDFISH.system.effects[0]
 
 
 def test_the_sine_is_a_sine():
-    """Laid out in the plane, the elements lie on A sin(k x) with the amplitude and wavelength asked for."""
+    """Laid out in the plane, the elements lie on A sin(k x) with the amplitude and
+    wavelength asked for."""
     gait = Sine(amplitude=0.3, waves=2.0, elements=2000)
     z = np.cumsum(np.exp(1j * gait.headings(0.7))) / 2000
     wavelength = gait.wavelength()
@@ -76,7 +78,8 @@ def test_backbones_are_of_order_two(body):
 
 
 def test_arcs_and_modes_bend_as_they_say():
-    """From the middle of the first element to that of the last: half an element's bend is missing at either end."""
+    """From the middle of the first element to that of the last: half an element's bend
+    is missing at either end."""
     arcs = ConstantCurvature(elements=60, sections=3)
     assert arcs.bends.sum(0) == pytest.approx([1 - 1 / 40, 1.0, 1 - 1 / 40])
     modes = Serpenoid(elements=200, waves=2.0)
@@ -88,8 +91,9 @@ def test_arcs_and_modes_bend_as_they_say():
 @pytest.mark.parametrize("medium", [GLASS, Coulomb(), Viscous(2.0)])
 @pytest.mark.parametrize("seed", range(3))
 def test_forces_and_internal_moments_by_an_independent_sum(medium, seed):
-    """From `traction` at many points and velocities by differences: the medium's forces vanish together; its moment on
-    the tail's side of a joint is that of the joint, and that on the head's side the opposite."""
+    """From `traction` at many points and velocities by differences: the medium's forces
+    vanish together; its moment on the tail's side of a joint is that of the joint, and
+    that on the head's side the opposite."""
     rng = np.random.default_rng(seed)
     body = Chain((2.0, 1.0, 3.0, 1.0, 2.0))
     shapes = rng.uniform(-0.8, 0.8, 4), rng.normal(size=4)
@@ -117,8 +121,9 @@ def test_slip_counts_every_link_by_its_length():
 
 
 def test_sawtooth_is_algebra():
-    """Straight pieces at +- theta: one equation for the attack angle psi, (1 + C / sqrt(tan^2 g0 + sin^2 psi)) tan psi
-    = cot theta; in a viscous medium the efficiency is (r - 1) sin^2 / (cos^2 + r sin^2)."""
+    """Straight pieces at +- theta: one equation for the attack angle psi, (1 + C /
+    sqrt(tan^2 g0 + sin^2 psi)) tan psi = cot theta; in a viscous medium the efficiency
+    is (r - 1) sin^2 / (cos^2 + r sin^2)."""
     theta, r = 0.6, 3.0
     c, s, tan2 = np.cos(theta), np.sin(theta), np.tan(GLASS.gamma0) ** 2
 
@@ -138,8 +143,8 @@ def test_sawtooth_is_algebra():
 
 
 def test_endless_sine_in_loose_glass():
-    """Best progress of the single-period sine near A / lambda = 0.2, efficiency there about 0.7; head drag lowers it
-    towards the published 0.5."""
+    """Best progress of the single-period sine near A / lambda = 0.2, efficiency there
+    about 0.7; head drag lowers it towards the published 0.5."""
     a = np.linspace(0.1, 0.4, 31)
     plain = np.array([undulation.endless_sine(GLASS, x) for x in a])
     best, _ = undulation.optimum(a, plain * Sine().wavelength(a))
@@ -148,7 +153,8 @@ def test_endless_sine_in_loose_glass():
     assert 0.5 < undulation.endless_sine(GLASS, 0.2, HEAD) < plain[10] - 0.04
 
 
-# Best progress over the arc length of a wave of an endless sine, and its A / lambda, by what its points do.
+# Best progress over the arc length of a wave of an endless sine, and its A / lambda, by
+# what its points do.
 ENDLESS = {
     ("glass-0.3mm-loose", "sliding"): (0.2108, 0.5305),
     ("glass-0.3mm-loose", "sideways"): (0.2119, 0.5152),
@@ -159,7 +165,8 @@ SLOPE = 2 * np.pi * np.cos(2 * np.pi * (np.arange(4000) + 0.5) / 4000)  # of A /
 
 
 def own_velocity(progress, slope, kinematics):
-    """Velocity along and across of points of a wave of speed 1, held to their kinematics in the swimmer's frame."""
+    """Velocity along and across of points of a wave of speed 1, held to their
+    kinematics in the swimmer's frame."""
     root = np.sqrt(1 + slope**2)
     if kinematics == "sideways":
         v_x, v_y = progress, slope
@@ -170,7 +177,8 @@ def own_velocity(progress, slope, kinematics):
 
 @pytest.mark.parametrize(("name", "kinematics"), ENDLESS)
 def test_endless_waves_slide_or_go_sideways(name, kinematics):
-    """The forces of a wave integrated over x vanish. Over the wavelength there is no optimum."""
+    """The forces of a wave integrated over x vanish. Over the wavelength there is no
+    optimum."""
     medium, a = CATALOGUE[name].medium, np.linspace(0.15, 0.35, 41)
     options = {"elements": 500, "kinematics": kinematics}
     found = np.array([undulation.endless_sine(medium, x, **options) for x in a])
@@ -201,9 +209,10 @@ def numbers():
 
 
 def test_fig09c_has_the_published_numbers(numbers):
-    """0.7 without and 0.5 with yaw and head drag at the animal's wave, 0.22; "compared with S. scincus, little slip";
-    "both swimmers also minimized their energy use": the best wave is near the cheapest. Progress has an optimum, for the
-    whole sandfish elsewhere; the text's has none."""
+    """0.7 without and 0.5 with yaw and head drag at the animal's wave, 0.22; "compared
+    with S. scincus, little slip"; "both swimmers also minimized their energy use": the
+    best wave is near the cheapest. Progress has an optimum, for the whole sandfish
+    elsewhere; the text's has none."""
     loose, close, snake = (numbers[k] for k in list(CHEAPEST))
     a = loose["amplitude"]
     assert np.interp(0.2, a, loose["endless"]) == pytest.approx(0.7, abs=0.01)
@@ -216,13 +225,15 @@ def test_fig09c_has_the_published_numbers(numbers):
     for found in (loose, snake):
         cheapest = found["best"]["cost_of_transport"][0]
         assert found["best"]["progress"][0] == pytest.approx(cheapest, abs=0.06)
-    # By the arc length of a wave the optimum of an endless wave is at the animal, by the wavelength there is none.
+    # By the arc length of a wave the optimum of an endless wave is at the animal, by
+    # the wavelength there is none.
     arc = fig09c_efficiency.arc_efficiency(loose, "endless")
     assert undulation.optimum(a, arc)[0] == pytest.approx(0.211, abs=0.004)
     assert undulation.optimum(a, loose["endless"]) is None
 
 
-# With three times the elements: where transport is cheapest, A / lambda and cost; slip at A / lambda = 0.22, rad.
+# With three times the elements: where transport is cheapest, A / lambda and cost; slip
+# at A / lambda = 0.22, rad.
 CHEAPEST = {
     "sandfish-loose": (0.282, 2.878, 0.2996),
     "sandfish-close": (0.322, 3.134, 0.4031),
@@ -232,7 +243,8 @@ CHEAPEST = {
 
 @pytest.mark.parametrize("name", CHEAPEST)
 def test_cost_and_slip(numbers, name):
-    """The scenes' own elements are within 1.5 % of three times as many, and what is left shrinks."""
+    """The scenes' own elements are within 1.5 % of three times as many, and what is
+    left shrinks."""
     best, cost, slip = CHEAPEST[name]
     found, scene = numbers[name], scenes.load(name)
     place, least = found["best"]["cost_of_transport"]
@@ -270,7 +282,8 @@ def test_an_optimum_is_that_of_a_parabola_through_logarithms():
 
 
 def test_body_velocity_through_the_cycle():
-    """In body lengths whatever the size; half a cycle later the mirror image; integrated, the progress."""
+    """In body lengths whatever the size; half a cycle later the mirror image;
+    integrated, the progress."""
     found = undulation.performance(SANDFISH, [0.1, 0.22])
     velocity = found["velocity"]
     half_later = np.roll(velocity, velocity.shape[1] // 2, 1)
@@ -291,8 +304,8 @@ PAIR = PAIR.with_numerics(phases=16)
 
 
 def test_any_gait_has_the_wave_that_its_bends_make():
-    """Modes of a chain, told by the motion, as the wave of joint angles that they are; a chain with an offset has one,
-    too; one joint has none."""
+    """Modes of a chain, told by the motion, as the wave of joint angles that they are;
+    a chain with an offset has one, too; one joint has none."""
     a = [0.4, 0.87]
     known, moved = undulation.performance(CHAIN, a), undulation.performance(MODES, a)
     for key in ("waves", "wavelength", "relative_curvature", "efficiency"):
@@ -327,7 +340,8 @@ def waving(waves, elements=50, phases=64, effects=(), **gait):
     [waving(1.0), waving(1.5), waving(1.0, effects=SANDFISH.system.effects), SANDFISH],
 )
 def test_onset_and_offset_are_where_the_moment_changes_sign(scene):
-    """Solved anew just before and after, between the phases that the lines were found from."""
+    """Solved anew just before and after, between the phases that the lines were found
+    from."""
     found, system = undulation.activation(scene), scene.system
     assert (found["changes"] == 2).all()
     for key, sign in (("onset", 1.0), ("offset", -1.0)):
@@ -350,7 +364,8 @@ def test_lag_counts_from_the_zero_of_curvature():
     np.testing.assert_allclose(found["lag"], found["fundamental_lag"], atol=0.25)
 
 
-# 400 elements, 512 phases: waves: speed of activation over curvature by the lines, by the first harmonic; lag at s = 0.25.
+# 400 elements, 512 phases: waves: speed of activation over curvature by the lines, by
+# the first harmonic; lag at s = 0.25.
 ACTIVATION = {
     0.5: (2.748, 3.040, 2.062),
     0.75: (2.680, 2.594, 2.293),
@@ -376,10 +391,11 @@ def test_the_speed_ratio_converges_with_order_two_in_elements_and_phases(waves, 
 
 
 def test_fig10(tmp_path):
-    """The wave of activation outruns that of curvature, the less the more waves the body has (0.5 to 1.8), and is ahead
-    of it ever more towards the tail. At the middle of a body alike fore and aft, muscles work just while they shorten;
-    head drag brings them forward. 70 % of the way to the tail the right side starts before the body is bent most to the
-    left, by 0.1 of a cycle."""
+    """The wave of activation outruns that of curvature, the less the more waves the
+    body has (0.5 to 1.8), and is ahead of it ever more towards the tail. At the middle
+    of a body alike fore and aft, muscles work just while they shorten; head drag brings
+    them forward. 70 % of the way to the tail the right side starts before the body is
+    bent most to the left, by 0.1 of a cycle."""
     module = fig10_neuromechanics
     numbers = module.compute(module.SELECTED, elements=50, phases=64)
     lines, harmonic, lag = np.array(list(ACTIVATION.values())).T
@@ -401,7 +417,8 @@ def test_fig10(tmp_path):
 
 
 def test_extra_changes_of_sign_are_not_passed_off_as_onsets():
-    """Two waves on the body nearly leave its middle without a moment: it changes sign six times there."""
+    """Two waves on the body nearly leave its middle without a moment: it changes sign
+    six times there."""
     found = undulation.activation(waving(2.0, 120, 128))
     odd = found["changes"] != 2
     assert 0 < odd.sum() < 10
@@ -412,7 +429,7 @@ def test_extra_changes_of_sign_are_not_passed_off_as_onsets():
 
 
 def test_the_wave_of_joint_angles_is_that_of_a_long_chain():
-    """By sums over 10,000 body lengths, a whole number of waves; a small one is a sine."""
+    """By sums over 10,000 body lengths, whole waves; a small one is a sine."""
     wave = Wave(amplitude=0.7, waves=1.3, joints=6)
     alpha = 0.7 * np.cos(0.4 + 2 * np.pi * 1.3 * np.arange(70_000) / 7)
     straight = np.abs(np.exp(1j * np.cumsum(alpha)).mean())
