@@ -1,5 +1,6 @@
-"""Tangents against differences, every column: of every law under every rule, every effect, and the mass. A wrong one
-costs Newton's method its speed or its answer, and nothing else would say so."""
+"""Tangents against differences, every column: of every law under every rule, every
+effect, and the mass. A wrong one costs Newton's method its speed or its answer, and
+nothing else would say so."""
 
 import numpy as np
 import pytest
@@ -22,8 +23,8 @@ GLASS = Granular(C=1.8, gamma0=0.24)
 
 
 def assert_is_slope(load, v, rtol=2e-6):
-    """load: v (3, n, B) -> (3, 4, n, B), columns 1 to 3 the derivatives of column 0; each row by its own largest
-    slope."""
+    """load: v (3, n, B) -> (3, 4, n, B), columns 1 to 3 the derivatives of column 0;
+    each row by its own largest slope."""
     h = 1e-6
     tangent = load(v)[:, 1:]
     steps = h * np.eye(3)[:, :, None, None]
@@ -51,7 +52,8 @@ def test_laws(law, how):
 
 
 def at_one_step(effects, body, medium, samples, rng):
-    """The balance with effects within a gait whose ground, place and past are not those of its start."""
+    """The balance with effects within a gait whose ground, place and past are not those
+    of its start."""
     assembly = assemble(medium, body, effects)
     stepwise = stepwise_effects(assembly.effects)
     always = assembly._replace(
@@ -75,7 +77,8 @@ def at_one_step(effects, body, medium, samples, rng):
 
 
 def loads_on(problem, v, eps):
-    """Loads of all elements, those of the sides first, (3, 4, n, B), at true velocities."""
+    """Loads of all elements, those of the sides first, (3, 4, n, B), at true
+    velocities."""
     n, scale = len(problem.sides.station), problem.law_speed_scale
     halves = tuple(v[:, :n] / scale), tuple(v[:, n:] / scale)
     found = loads(problem, halves, eps / scale)
@@ -120,14 +123,15 @@ def test_effects(name, medium):
 
 @pytest.mark.parametrize("name", ["body-inertia", "body-inertia, frequency"])
 def test_mass(name):
-    """What it adds to the balance: its tangent; what elements bear adds up to it; a few samples have their own."""
+    """What it adds to the balance: its tangent; what elements bear adds up to it; a few
+    samples have their own."""
     rng, samples = np.random.default_rng(4), 12
     mass = EFFECTS[name][0](0.5).with_parameters(mass=rng.uniform(0.5, 3.0, samples))
     problem = at_one_step([mass], BODIES["uneven"], GLASS, samples, rng)
     index, xi = np.array([3, 0, 7, 11]), rng.normal(size=(3, samples))
 
     def term(problem, xi):
-        """(3, 4, B): rate of change of momentum, and its slopes in the true velocity."""
+        """(3, 4, B): rate of change of momentum, and its slopes in the velocity."""
         m = row(frame_inertia(problem.sides.elements, problem.momentum_rate))
         nothing = Net(*[(np.zeros(xi.shape[-1]),) * 3] * 5)
         return np.stack(
@@ -154,7 +158,8 @@ def test_mass(name):
 
 
 def test_every_dry_law_is_homogeneous():
-    """eps dF/d(eps) = -(dF/dv) v: what the descent from one rounding to the next rests on."""
+    """eps dF/d(eps) = -(dF/dv) v: what the descent from one rounding to the next rests
+    on."""
     rng = np.random.default_rng(5)
     v, eps, h = rng.normal(size=(3, 2, 30)), np.full(30, 0.1), 1e-6
     for name, medium in DRY.items():
@@ -168,7 +173,8 @@ def test_every_dry_law_is_homogeneous():
 
 @pytest.mark.parametrize("how", ["exact", "gauss:5", "midpoint:4"])
 def test_loads_take_velocities_as_they_are(how):
-    """Of a yield stress with viscosity, doubled velocities leave the first as it is and double the second."""
+    """Of a yield stress with viscosity, doubled velocities leave the first as it is and
+    double the second."""
     rng, mud = np.random.default_rng(6), Mud()
     v, eps = rng.normal(size=(3, 2, 30)), np.full(30, 0.1)
     load = element_load(mud, how)

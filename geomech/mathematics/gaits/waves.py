@@ -111,7 +111,7 @@ def arc_to_phase(u: np.ndarray, slope: np.ndarray) -> np.ndarray:
         halley = newton / (1 + 0.5 * newton * m * sin * np.cos(p) / D2)
         step = np.clip(halley, -0.5, 0.5)
         p -= step
-        if np.abs(step).max() < 1e-6:
+        if np.abs(step).max(initial=0.0) < 1e-6:
             break
     return p
 
