@@ -1,7 +1,5 @@
 """Geometry on stored connections: body frames, metrics, and what is computed with them, as of the systems they came from."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from commands import geomech
@@ -16,7 +14,6 @@ from geomech.mathematics.geometry.coordinates import change_velocity
 from geomech.mathematics.geometry.representations import harmonics
 from geomech.mathematics.systems import Swimmer, Table
 from geomech.scenes import Numerics, Scene
-from geomech.shell.describe.system import system_lines
 from geomech.studies.estimates import effort, estimate
 from geomech.studies.maps import fields
 from geomech.studies.scene_tables import SceneTables
@@ -75,7 +72,7 @@ def test_a_table_in_another_frame_is_its_source_in_that_frame(
 
 @pytest.mark.parametrize("frame", ["link-2", "mean"])
 @pytest.mark.parametrize("joints", [2, 3])
-def test_a_table_is_carried_over_to_a_frame_and_back(joints, frame):
+def test_a_table_is_carried_over_to_a_frame(joints, frame):
     """Velocities as those of the frame, in every direction of alphadot; bounds of
     errors by |Ad|."""
     chain = rft.Chain((1, 2, 1.5, 1)[: joints + 1], frame="link-1")
@@ -99,10 +96,6 @@ def test_a_table_is_carried_over_to_a_frame_and_back(joints, frame):
         np.testing.assert_allclose(found[here], bound @ size[here], rtol=1e-12)
     xi = change_velocity(series.velocity(alpha, rates), h, hdot)
     np.testing.assert_allclose(other.harmonics.velocity(alpha, rates), xi, atol=1e-12)
-    back = tables.in_frame(other, "link-1", dataclasses.replace(chain, frame=frame))
-    coefficients = back.harmonics.coefficients
-    np.testing.assert_allclose(coefficients, series.coefficients, atol=1e-12)
-    np.testing.assert_allclose(back.connection.A, A.A, atol=1e-12)
 
 
 @pytest.mark.parametrize("ending", [".nc", ".mat"])
@@ -184,9 +177,6 @@ kind = "circle"
     assert scene.frame == frame
     assert scene.system.medium == VISCOUS
     assert scenes.parse(scenes.toml(scene)).system == scene.system
-    told = "\n".join(system_lines(scene.system))
-    assert "cost the drag of viscous (ratio = 2.0) on chain (" in told
-    assert ("frame mean, from link-1 in the file" in told) == (frame == "mean")
 
 
 def test_a_metric_of_a_file_from_elsewhere_is_no_power(sources, tmp_path):
