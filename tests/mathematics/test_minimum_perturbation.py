@@ -20,7 +20,7 @@ from geomech.mathematics.tiers.direct import direct
 from geomech.mathematics.tiers.path import path
 from geomech.studies.maps import fields
 from geomech.studies.scene_tables import SceneTables
-from rft import Chain, ConstantCurvature, Granular, Serpenoid, Viscous
+from rft import Chain, ConstantCurvature, Serpenoid, Viscous
 from rft.bodies.base import body_size
 from rft.core.refusal import Refusal
 from rft.formulas import se2
@@ -171,16 +171,6 @@ def test_it_makes_the_connection_of_any_body_smaller(body, points):
     assert size(c, [2]) <= 1.001 * size(first, [2])
 
 
-def test_sand_is_closer_to_its_area_integral():
-    first = fitted(Chain(frame="link-2"), medium=Granular(1.8, np.radians(13.8)))
-    off = []
-    for c in (first, smallest(first)):
-        integral = area(curvature.ccf(c), Circle(), [1.0, 1.5])
-        difference = integral - path(c, Circle(), [1.0, 1.5])
-        off.append(np.abs(difference)[:, :2].max(-1))
-    assert (off[1] < 0.5 * off[0]).all()
-
-
 SCENE = """frame = "minimum-perturbation"
 [medium]\nlaw = "{law}"\n{numbers}
 [body]\nkind = "chain"\nlengths = [0.7, 1.4, 0.9]\nlength = 0.3
@@ -254,16 +244,3 @@ def test_its_file_has_the_pose_of_the_frame(tmp_path):
         pose = file.variables["frame_pose"]
         assert np.array(pose[:]) == pytest.approx(scene.system.field.field.values)
         assert pose.units == b"m, m, rad"
-
-
-def test_a_connection_that_turns_by_a_gradient_alone():
-    """The differential drive: of A^theta nothing is left, and in the middle the CCF is
-    the cart's own."""
-    study = SceneTables(scenes.load("differential-drive"))
-    c = smallest(study.fitted)
-    assert np.abs(c.A[2]).max() < 1e-10 * np.abs(study.fitted.A[2]).max()
-    assert size(c) < size(study.fitted)
-    cart = study.scene.system
-    n = len(c.axes[0]) // 2
-    middle = [0, -(cart.wheel_radius**2) / cart.track, 0]
-    assert curvature.ccf(c).values[:, n, n] == pytest.approx(middle, abs=1e-4)

@@ -1,10 +1,7 @@
 """Chains that move in modes, and waves of joint angles: the plain chain along the same angles, circles and backbones."""
 
-import dataclasses
-
 import numpy as np
 import pytest
-from tabled import swept_table
 
 import rft
 from geomech import scenes
@@ -14,7 +11,6 @@ from geomech.mathematics.systems import Swimmer, Table
 from geomech.mathematics.systems.base import shape_labels
 from geomech.scenes import Scene
 from geomech.studies.available import available_tiers
-from geomech.studies.displacement import sweep
 from geomech.studies.maps import fields
 from geomech.studies.scene_tables import SceneTables, refuse_outside
 from rft import Chain, EndCaps, Granular, Serpenoid, SkinFriction, Transient, Viscous
@@ -83,20 +79,6 @@ def test_connection_and_ccf_are_pulled_back():
     np.testing.assert_allclose(found, -expected.swapaxes(1, 2) / 8, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["three-link-glass", "three-link-viscous"])
-def test_identity_modes_are_the_plain_chain(name):
-    coarse = {"grid": 5, "phases": 32, "curves": 6, "harmonics": 5}
-    scene = scenes.load(name)
-    text = scene.text.replace("[body]", "[body]\nmodes = [[1, 0], [0, 1]]")
-    plain = SceneTables(scene.with_numerics(**coarse))
-    modes = SceneTables(scenes.parse(text).with_numerics(**coarse))
-    assert modes.tiers == plain.tiers
-    for tier in plain.tiers:
-        np.testing.assert_allclose(modes.poses(tier), plain.poses(tier), atol=1e-15)
-    error = plain.curvature_error.values
-    np.testing.assert_allclose(modes.curvature_error.values, error, atol=1e-13)
-
-
 @pytest.mark.parametrize("tier", ["path", "direct"])
 def test_a_single_mode_closes_no_loop_and_goes_nowhere(tier):
     one = Swimmer(SAND, Chain(LENGTHS, modes=[[1, -0.5, 0.3]]))
@@ -104,14 +86,6 @@ def test_a_single_mode_closes_no_loop_and_goes_nowhere(tier):
     gait = Fourier(cos=[[0.5, 0.1]], sin=[[0.2, 0.3]])
     study = SceneTables(Scene(one, gait).with_numerics(grid=9, phases=256))
     np.testing.assert_allclose(study.poses(tier), 0, atol=3e-5)
-
-
-def test_as_many_modes_as_joints_lose_nothing():
-    full = Chain(LENGTHS, 0.3, FRAME, modes=(*ROWS, (1, -1, 1)))
-    shape, rate = (x @ ROWS @ np.linalg.inv(full.modes) for x in (SHAPE, RATE))
-    found = rft.body_velocity(SAND, full, shape, rate).checked().xi
-    expected = rft.body_velocity(SAND, MODES, SHAPE, RATE).xi
-    np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("waves", [0.7, 1.0, 1.5])
@@ -162,14 +136,6 @@ def test_modes_that_make_no_body_are_refused(modes, waves, said):
 def test_modes_go_through_scene_files(body):
     scene = Scene(Swimmer(SAND, body), Circle())
     assert scenes.parse(scenes.toml(scene)).system == scene.system
-
-
-def test_the_waves_of_modes_are_swept():
-    scene = scenes.load("seven-link-modes").with_numerics(grid=5, phases=32)
-    found = swept_table(sweep.sweep(scene, {"body.waves": [0.8, 1.2]}))["displacement"]
-    for waves, pose in zip((0.8, 1.2), found):
-        again = scene.changed(body=Chain((1,) * 7, modes="serpenoid", waves=waves))
-        np.testing.assert_allclose(pose, SceneTables(again).poses("direct"), atol=1e-13)
 
 
 def test_a_serpenoid_has_one_wave_if_it_does_not_say():
@@ -243,15 +209,6 @@ def test_a_wave_is_about_its_centre_and_offset():
     wave = Wave(joints=3, amplitude=0.4, offset=0.2, centre=(0.1, 0.0, -0.1))
     np.testing.assert_allclose(wave.cycle(64)[0].mean(0), [0.3, 0.2, 0.1], atol=1e-15)
     np.testing.assert_allclose(wave.shape(0.3, 0.0), [0.3, 0.2, 0.1], atol=1e-15)
-
-
-def test_waves_are_swept():
-    over = {"gait.waves": [0.8, 1.0], "gait.offset": [0.0, 0.1]}
-    coarse = ROBOT.with_numerics(phases=32)
-    found = swept_table(sweep.sweep(coarse, over))["displacement"][0, 1]
-    gait = dataclasses.replace(ROBOT.gait, waves=0.8, offset=0.1)
-    one = SceneTables(coarse.changed(gait=gait)).poses("direct")
-    np.testing.assert_allclose(found, one, atol=1e-13)
 
 
 def test_a_wave_of_seven_links_swims_as_in_grains():

@@ -6,7 +6,7 @@ import dataclasses
 import numpy as np
 import pytest
 from commands import geomech
-from tabled import of_json, tabled, tabled_json
+from tabled import of_json, tabled
 
 from geomech import Numerics, Scene
 from geomech.io.results import to_xarray
@@ -23,10 +23,8 @@ from geomech.mathematics.geometry.traits import Traits
 from geomech.mathematics.geometry.two_form import spanned, spanned_by, two_form
 from geomech.mathematics.systems import Swimmer, Table
 from geomech.mathematics.tiers.area import area
-from geomech.mathematics.tiers.direct import direct
 from geomech.mathematics.tiers.fitted import finest_grid, is_too_large
 from geomech.questions.swimmers.run import Run
-from geomech.scenes.frames import framed
 from geomech.studies.maps import fields
 from geomech.studies.maps.shape_space import plane_origin
 from geomech.studies.scene_tables import SceneTables
@@ -285,19 +283,6 @@ def test_with_two_joints_every_surface_is_the_area():
     assert found.spread.max() < 1e-8
 
 
-def test_the_area_of_a_swimmer_misses_by_order_three(fluid):
-    """And the spread over surfaces tells how much of it, but of turning nothing."""
-    sizes = np.array([0.2, 0.4])
-    found = spanned(two_form(fluid), LOOP, sizes)
-    true = direct(Swimmer(Viscous(2.3), FOUR_LINKS).velocity, LOOP, sizes)
-    off = np.hypot(*(found.net - true)[:, :2].T)
-    assert np.log2(off[1] / off[0]) == pytest.approx(3, abs=0.25)
-    spread = found.spread
-    assert np.log2(spread[1, 0] / spread[0, 0]) == pytest.approx(3, abs=0.3)
-    assert (spread[:, 0] < off).all()
-    assert (spread[:, 1] < 1e-6 * np.abs(found.net[:, 2])).all()
-
-
 def test_a_closed_form_does_not_see_the_surface(fluid):
     """The exact form d(alpha_1 alpha_2 dalpha_3) has the integral along the loop."""
     form = two_form(fluid)
@@ -382,16 +367,6 @@ def test_three_joints_keep_their_field_and_more_have_one_that_fits(
     assert (finest_grid(4), finest_grid(5)) == (13, 7)
 
 
-def test_a_frame_of_numbers_needs_a_field():
-    chain = Swimmer(Viscous(2.0), Chain((1,) * 5))
-    with pytest.raises(
-        ValueError, match=r"a frame on a grid of 15\^4 shapes is too la"
-    ):
-        framed(chain, Numerics(grid=15))
-    scene = Scene(framed(chain, Numerics(grid=7)), Wave(joints=4), Numerics(grid=7))
-    assert SceneTables(scene).cost([1.0], ["direct"]).balances > 7**4 * 16 / 2
-
-
 # Files and commands.
 
 
@@ -427,17 +402,3 @@ def test_a_run_of_three_joints_has_its_field_and_tiers():
     scene = Scene(Swimmer(Viscous(2.3), FOUR_LINKS), LOOP, Numerics(grid=5, extent=1.2))
     assert {"area", "path", "direct"} <= {*Run(scene).ask()["tier"].values}
     assert Run(scene).cost().balances >= 5**3 // 2 * 12 + 3 * 5**2 * 12
-
-
-def test_six_links_have_area_and_path(tmp_path):
-    links = "[0.7, 1.4, 0.9, 0.6, 1.1, 0.8]"
-    chain = SCENE.partition("[gait]")[0].replace("[0.7, 1.4, 0.9, 0.6]", links)
-    gait = '[gait]\nkind = "wave"\namplitude = 0.8\njoints = 5\n'
-    (tmp_path / "six.toml").write_text(chain + gait)
-    args = ("displacement", "six.toml", "--amplitudes", "0.2,0.4", "--json")
-    table = tabled_json(geomech(*args, cwd=tmp_path)[1])
-    assert {"area", "path", "direct"} < {*table}
-    off = np.array(table["area"]) - table["direct"]
-    distance = np.hypot(*off[:, :2].T)
-    assert np.log2(distance[1] / distance[0]) == pytest.approx(3.0, abs=0.3)
-    np.testing.assert_allclose(off[:, 2], 0, atol=1e-5)

@@ -225,7 +225,7 @@ def test_few_phases_tell_how_many_are_solved(cos, sin, shares, start):
     """Of any number; images lie on phases of some of these only."""
     gait = Late(cos=cos.tolist(), sin=sin.tolist(), start=start)
     for traits, share in zip((NOTHING, MIRROR, BACKWARDS, BOTH), shares):
-        for phases in (*range(8, 33), *range(33, 201, 13), 1023, 1024):
+        for phases in (*range(8, 33), 201, 1024, 2049, 4096):
             solved = cycle_images(*gait.cycle(phases), traits).count
             assert solved_count(gait, phases, traits) == solved
             assert solved >= phases // share
@@ -265,14 +265,6 @@ def test_gaits_side_by_side_have_their_own_parameters():
         own = dataclasses.replace(effect, frequency=frequencies[k])
         xi = Swimmer(GLASS, body, (own,)).velocity(alpha[k], alphadot[k])
         np.testing.assert_allclose(run.xi[k], xi, rtol=0, atol=1e-10)
-
-
-def test_a_run_may_start_from_what_is_known_of_all_phases():
-    swimmer = Swimmer(GLASS, Chain((1, 2, 1)))
-    alpha, alphadot = Circle().cycle(32, [0.5, 0.9])
-    xi = swimmer.velocity(alpha, alphadot)
-    run = swimmer.run(alpha, alphadot, start=xi)
-    np.testing.assert_allclose(run.xi, xi, rtol=0, atol=1e-10)
 
 
 # Components of a displacement that are 0 by symmetry.

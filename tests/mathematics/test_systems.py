@@ -23,7 +23,6 @@ from geomech.studies.estimates import cost
 from geomech.studies.scene_tables import SceneTables
 from rft import Backbone, Chain, Coulomb, Serpenoid, Transient
 from rft.core.refusal import Refusal
-from rft.formulas import se2
 from rft.formulas.newton import to_element
 
 AWAY = Ellipse(
@@ -95,16 +94,6 @@ def test_tiers_of_the_snake_agree_with_its_closed_form(tier, atol):
     np.testing.assert_allclose(found, exact, atol=atol)
     assert study.tiers == ("adapted", "path", "direct")
     assert default_tiers(study.scene.system) == ("path", "direct")
-
-
-def test_the_built_in_snake_goes_where_its_closed_form_does():
-    """Told in the mean frame: g h at both ends of the cycle, h the mean frame in the middle link's."""
-    scene = scenes.load("no-slip-snake")
-    assert scene.frame == "mean"
-    net = direct(symbolic.velocity(*closed_form()), scene.gait, None, 512)
-    h = Chain(frame="link-2").frame_pose("mean", scene.gait.shape(0.0), [0.0, 0.0])[0]
-    wanted = se2.compose(se2.compose(se2.inverse(h), net), h)
-    np.testing.assert_allclose(SceneTables(scene).poses("direct"), wanted, atol=1e-12)
 
 
 @pytest.mark.parametrize("lengths", [(1, 1, 1), (1, 1.5, 0.7)])
@@ -251,13 +240,13 @@ def test_published_gaits_are_compared_for_three_plain_links_alone(body, expected
     assert is_three_link(Swimmer(Coulomb(), body)) == expected
 
 
-def test_systems_of_users_have_one_to_ten_thousand_joints():
-    assert WrappedSystem(len, 10_000).joints == 10_000
-    for joints in (0, 10_001):
-        with pytest.raises(
-            Refusal, match="joints must be a whole number from 1 to 100"
-        ):
-            WrappedSystem(len, joints)
+@pytest.mark.parametrize(("joints", "fits"), [(0, 0), (1, 1), (10_000, 1), (10_001, 0)])
+def test_systems_of_users_have_one_to_ten_thousand_joints(joints, fits):
+    if fits:
+        assert WrappedSystem(Disc().velocity, joints).joints == joints
+        return
+    with pytest.raises(Refusal, match="joints must be a whole number from 1 to 10000"):
+        WrappedSystem(Disc().velocity, joints)
 
 
 @pytest.mark.parametrize(

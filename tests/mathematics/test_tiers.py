@@ -98,19 +98,6 @@ def test_families_of_every_gait(name, medium):
 TURNING = Circle(centre=(0.5, 0.2))
 
 
-def test_errors_shrink_with_the_curves_where_the_body_turns():
-    """Of order 4 where nothing kinks, though it turns by 0.2 rad per cycle."""
-    a = np.linspace(0.0, 1.4, 401)[1:]
-    exact = direct(FLUID.system.velocity, TURNING, a)
-    assert np.abs(exact[:, 2]).max() > 0.2
-    errors = []
-    for curves in (8, 16, 32):
-        study = SceneTables(FLUID.with_numerics(curves=curves))
-        errors.append(np.abs(study.poses("adapted", TURNING, a) - exact).max())
-    order = -np.polyfit(np.log([8, 16, 32]), np.log(errors), 1)[0]
-    assert order == pytest.approx(4.0, abs=0.2)
-
-
 @pytest.mark.parametrize(
     "gait", [TURNING, Circle(centre=(0.6, -0.6), reverse=True), Circle()]
 )

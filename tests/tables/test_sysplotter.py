@@ -88,12 +88,6 @@ def test_a_struct_without_geometry_is_one_of_unknown_lengths_and_frame(tmp_path)
     np.testing.assert_array_equal(table.stored.connection.A, cubics((3, 2), 0))
 
 
-def test_a_struct_of_inertia_has_path_lengths_and_no_work(tmp_path):
-    effort = study(Table(write(tmp_path / "s.mat", system_type="inertia"))).effort()
-    assert np.isnan(effort["work"]).all()
-    assert np.isfinite(effort["path_length"]).all()
-
-
 def test_a_struct_of_three_joints_is_read(tmp_path):
     """Without a length the links are lengths in the file's unit."""
     four = Swimmer(FLUID, rft.Chain((1, 1, 1, 1), frame="link-2"))

@@ -4,12 +4,10 @@ from predicts."""
 import dataclasses
 import json
 import pickle
-import shutil
 
 import numpy as np
 import pytest
 from commands import geomech
-from registry import SYSTEMS
 from scipy.io import loadmat, savemat
 from tabled import tabled
 
@@ -27,7 +25,6 @@ from geomech.mathematics.systems.table import LENGTHS
 from geomech.scenes import Numerics, Scene
 from geomech.shell.describe.scene import description
 from geomech.shell.describe.system import system_lines
-from geomech.studies.displacement import choose
 from geomech.studies.estimates import estimate
 from geomech.studies.maps import fields
 from geomech.studies.mechanics.single import diagnosed_velocity
@@ -191,25 +188,6 @@ def test_the_sign_of_a_bare_mat_file_is_made_out(frame, medium, tmp_path):
         told = tables.load(tmp_path / "a.mat", sign="+")
         np.testing.assert_array_equal(told.connection.A, factor * c.A)
         assert "sign" not in "".join(told.assumptions)
-
-
-@pytest.mark.parametrize(
-    "args",
-    [
-        ["explain"],
-        ["displacement", "--amplitudes", "0.3"],
-        ["sweep", "--over", "gait.amplitude=0.3", "-o", "s.nc"],
-        ["connection", "-o", "c.nc"],
-        ["ccf"],
-    ],
-    ids=lambda args: args[0],
-)
-def test_a_sign_that_is_made_out_is_noted_once(args, made, tmp_path):
-    plain_mat(tmp_path / "a.mat", made[1].fitted)
-    table_scene(tmp_path / "a.mat")
-    code, _, err = geomech(args[0], "a.toml", *args[1:], cwd=tmp_path)
-    assert code == 0
-    assert err.count("its sign is made out as") == 1
 
 
 @pytest.mark.parametrize(
@@ -401,14 +379,6 @@ def test_a_table_is_saved_and_pickled_as_the_name_of_its_file(made):
     assert len(pickled) < 1000
 
 
-def test_a_scene_that_is_written_elsewhere_finds_its_file(tmp_path):
-    shutil.copy(SYSTEMS["table"].file, tmp_path / "t.nc")
-    made = scenes.load(table_scene(tmp_path / "t.nc"))
-    (tmp_path / "results").mkdir()
-    (tmp_path / "results" / "scene.toml").write_text(scenes.toml(made))
-    assert scenes.load(tmp_path / "results" / "scene.toml").system == made.system
-
-
 def unsized(made, path):
     """The table of `made` in a file that does not state lengths."""
     if path.suffix == ".mat":
@@ -471,5 +441,3 @@ def test_what_accuracy_costs_includes_the_tables_own_error(made):
     np.testing.assert_array_equal(np.isfinite(best), met)
     assert (best[met] > largest).all()
     assert (best[met] <= tolerance[met]).all()
-    with pytest.raises(Refusal, match="no tier gets to 1e-06 .*take a finer table"):
-        choose.cheapest_displacements(scene, [0.5], 1e-6)
