@@ -1,4 +1,4 @@
-"""The chain: its geometry against a drawing made link by link, its frames, its bounds."""
+"""The chain: its geometry against a drawing made link by link, and its bounds."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,8 @@ def by_hand(body, alpha):
     if body.frame != "mean":
         weights = np.eye(len(lengths))[int(body.frame.removeprefix("link-")) - 1]
     zero = weights @ headings
-    c, s = np.cos(zero), np.sin(zero)
+    c = np.cos(zero)
+    s = np.sin(zero)
     turned = (centres - weights @ centres) @ np.array([[c, -s], [s, c]])
     return headings - zero, turned
 
@@ -38,7 +39,8 @@ def test_links_are_where_they_should_be(name):
     for k in range(7):
         headings, centres = by_hand(body, alpha[:, k])
         x, y = centres.T
-        c, s = np.cos(headings), np.sin(headings)
+        c = np.cos(headings)
+        s = np.sin(headings)
         expected = [c, s, x * s - y * c, y * s + x * c]
         found = [v[:, k] for v in (motion.c, motion.s, motion.r_t, motion.r_n)]
         np.testing.assert_allclose(found, expected, atol=1e-14)
@@ -53,7 +55,8 @@ def test_velocities_are_the_rates_of_places(name):
     h0, p0 = by_hand(body, alpha - 1e-6 * alphadot)
     x, y = (p1 - p0).T / 2e-6
     turn = (h1 - h0) / 2e-6
-    c, s = motion.c[:, 0], motion.s[:, 0]
+    c = motion.c[:, 0]
+    s = motion.s[:, 0]
     own = c * x + s * y, c * y - s * x, turn * motion.half[:, 0]
     np.testing.assert_allclose(motion.v[..., 0], own, atol=1e-9)
 

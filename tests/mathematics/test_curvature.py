@@ -1,4 +1,4 @@
-"""The CCF of any pair of joints, its estimated error near kinks, and what a file says of both."""
+"""The CCF of any pair of joints, its estimated error near kinks, and its file."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,5 @@
-"""Gaits: rates are derivatives, amplitudes scale about the centre, the butterfly is the published one."""
+"""Gaits: rates are derivatives, amplitudes scale about the centre, the butterfly is
+the published one."""
 
 import numpy as np
 import pytest
@@ -77,7 +78,7 @@ def test_points_are_passed_through_in_order():
 
 
 def test_points_are_reached_as_their_chords_are_run():
-    """Steps of 3, 4 and 5 rad: phase runs with chord length, not from point to point."""
+    """Steps of 3, 4 and 5 rad: phase runs with chord length, not by points."""
     points = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 4.0]])
     found = Points(points=points.tolist()).shape(2 * np.pi * np.array([0, 3, 7]) / 12)
     np.testing.assert_allclose(found, points, atol=1e-14)

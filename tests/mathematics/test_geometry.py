@@ -62,17 +62,19 @@ def test_directions_are_unit_vectors_that_span(joints, count):
 
 
 def test_fit_residual_is_the_rms_misfit():
-    swimmer = lambda a, d: (
-        np.stack([d[..., 0] ** 3, d[..., 0], 0 * d[..., 0]], -1) + 0 * a[..., :1]
-    )
+    """cos^3 = (3 cos + cos 3) / 4: the plane keeps 3/4 cos, and the misfit is
+    cos 3t / 4, of rms sqrt(1/32)."""
+
+    def swimmer(alpha, rate):
+        first = rate[..., 0] + 0 * alpha[..., 0]
+        return np.stack([first**3, first, 0 * first], -1)
+
     fitted = connection.fit(swimmer, connection.grid(2, 5, 1.0), 16, trusted=True)
-    # cos^3 = (3 cos + cos 3)/4: the plane keeps 3/4 cos, the misfit is cos 3t / 4, rms sqrt(1/32).
     np.testing.assert_allclose(fitted.A[0, 0], 0.75, atol=1e-14)
-    np.testing.assert_allclose(fitted.residual[0], np.sqrt(1 / 32), atol=1e-14)
-    np.testing.assert_allclose(fitted.residual[1], 0, atol=1e-14)
-    np.testing.assert_allclose(
-        fitted.speed[:, 2, 3], np.sqrt([5 / 16, 1 / 2, 0]), atol=1e-14
-    )
+    residual = [np.sqrt(1 / 32), 0, 0]
+    np.testing.assert_allclose(fitted.residual[:, 2, 3], residual, atol=1e-14)
+    speed = np.sqrt([5 / 16, 1 / 2, 0])
+    np.testing.assert_allclose(fitted.speed[:, 2, 3], speed, atol=1e-14)
 
 
 def test_scattered_directions_are_those_of_halton_and_all_round():

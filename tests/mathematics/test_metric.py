@@ -1,5 +1,5 @@
-"""The metric of shape space against known numbers and the work of gaits, and shape space
-redrawn by it."""
+"""The metric of shape space against known numbers and the work of gaits, and shape
+space redrawn by it."""
 
 import collections
 
@@ -186,23 +186,23 @@ def test_a_constant_metric_becomes_its_root(M):
 
 def bent(alpha):
     """A plane in curved coordinates."""
-    x, y = alpha[..., 0], alpha[..., 1]
-    return np.stack(
-        [x + 0.3 * np.sin(y) + 0.1 * x**2, 1.4 * y + 0.2 * x**2 - 0.2 * x], -1
-    )
+    x, y = np.moveaxis(alpha, -1, 0)
+    u = x + 0.3 * np.sin(y) + 0.1 * x**2
+    return np.stack([u, 1.4 * y + 0.2 * x**2 - 0.2 * x], -1)
 
 
 def pulled_back(alpha, rate):
-    x, y = alpha[..., 0], alpha[..., 1]
-    u, v = rate[..., 0], rate[..., 1]
-    return ((1 + 0.2 * x) * u + 0.3 * np.cos(y) * v) ** 2 + (
-        (0.4 * x - 0.2) * u + 1.4 * v
-    ) ** 2
+    """Its metric."""
+    x, y = np.moveaxis(alpha, -1, 0)
+    u, v = np.moveaxis(rate, -1, 0)
+    first = (1 + 0.2 * x) * u + 0.3 * np.cos(y) * v
+    return first**2 + ((0.4 * x - 0.2) * u + 1.4 * v) ** 2
 
 
 def test_a_flat_metric_in_disguise_is_flattened():
     """By order 2; the middle stays."""
-    off, left = [], []
+    off = []
+    left = []
     for points in (11, 21):
         found = stretch(metric.fit(pulled_back, connection.grid(2, points, 1.5)))
         middle = found.field.values[:, points // 2, points // 2]
@@ -291,6 +291,6 @@ X, Y = shapes((np.arange(5.0), np.arange(4.0)))
     [(X, Y, 0.0), (Y, X, 1.0), (np.minimum(X, 6.0 - X), Y, 0.25)],
 )
 def test_cells_that_are_turned_over_are_counted_by_triangles(x, y, share):
-    """Of a plane that is folded along the middle of its third column of four, all of the
-    last column and half of the third have no area or are turned over."""
+    """Of a plane that is folded along the middle of its third column of four, the last
+    column is turned over."""
     assert inverted_fraction(np.stack([x, y], -1)) == share

@@ -1,4 +1,5 @@
-"""Minimum-perturbation frames: what they minimise, that they do not depend on where one starts, that they converge."""
+"""Minimum-perturbation frames: what they minimise, that they do not depend on where
+one starts, that they converge."""
 
 import dataclasses
 
@@ -72,7 +73,8 @@ def test_work_is_the_same_in_every_frame():
 @pytest.mark.parametrize("body", [Chain((0.7, 1.4, 0.9), length=0.3), Chain((1, 2, 3))])
 def test_it_is_the_same_frame_wherever_one_starts(body):
     middle = np.zeros((1, 2))
-    poses, found = [], []
+    poses = []
+    found = []
     for name in ("mean", "link-1", "link-3"):
         first = fitted(dataclasses.replace(body, frame=name), 41)
         frame = minimum_perturbation(first)

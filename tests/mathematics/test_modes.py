@@ -1,4 +1,5 @@
-"""Chains that move in modes, and waves of joint angles: the plain chain along the same angles, circles and backbones."""
+"""Chains that move in modes, and waves of joint angles: as the plain chain along the
+same angles, circles and backbones."""
 
 import numpy as np
 import pytest
@@ -16,7 +17,8 @@ from geomech.studies.scene_tables import SceneTables, refuse_outside
 from rft import Chain, EndCaps, Granular, Serpenoid, SkinFriction, Transient, Viscous
 
 pytestmark = pytest.mark.usefixtures("fastest")
-LENGTHS, FRAME = (0.8, 1.3, 1.0, 0.7), "link-2"
+LENGTHS = (0.8, 1.3, 1.0, 0.7)
+FRAME = "link-2"
 ROWS = ((1.4, 0.3, -0.5), (-0.2, 0.9, 2.1))
 MODES = Chain(LENGTHS, 0.3, FRAME, modes=ROWS)
 PLAIN = Chain(LENGTHS, 0.3, FRAME)
@@ -25,8 +27,11 @@ COS = np.array([[0.5, 0.1], [0.0, 0.2]])
 SIN = np.array([[0.0, 0.1], [0.6, 0.0]])
 CENTRE = np.array([0.1, -0.2])
 GAIT = Fourier(cos=COS.tolist(), sin=SIN.tolist(), centre=CENTRE.tolist())
-SAME = Fourier(cos=(np.transpose(ROWS) @ COS).tolist(), sin=(np.transpose(ROWS) @ SIN).tolist(),
-               centre=(CENTRE @ ROWS).tolist())  # fmt: skip
+SAME = Fourier(
+    cos=(np.transpose(ROWS) @ COS).tolist(),
+    sin=(np.transpose(ROWS) @ SIN).tolist(),
+    centre=(CENTRE @ ROWS).tolist(),
+)
 ROBOT = scenes.load("seven-link-wave")
 RNG = np.random.default_rng(5)
 SHAPE, RATE = RNG.uniform(-0.7, 0.7, (2, 30, 2))

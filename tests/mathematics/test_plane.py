@@ -93,7 +93,8 @@ class Cubic:
             (1, 2): [0.4 + 0 * a, a, self.turns * (b - a)],
         }[i, j]
         A = self.A(alpha)
-        x, y = A[..., i], A[..., j]
+        x = A[..., i]
+        y = A[..., j]
         bracket = [
             y[..., 2] * x[..., 1] - x[..., 2] * y[..., 1],
             x[..., 2] * y[..., 0] - y[..., 2] * x[..., 0],

@@ -1,4 +1,4 @@
-"""The group of planar motions: axioms, 50-digit arithmetic, the bracket as a commutator."""
+"""The group of planar motions: axioms, 50 digits, the bracket as a commutator."""
 
 import itertools
 
@@ -21,8 +21,10 @@ ANGLES = np.concatenate(
 @pytest.mark.parametrize("size", ANGLES)
 def test_exp_and_log_in_fifty_digits(size, sign):
     theta = mp.mpf(sign * float(size))
-    x, y = mp.mpf("0.7"), mp.mpf("-1.3")
-    a, b, c = mp.mpf(1), mp.mpf(0), mp.mpf(1)
+    x = mp.mpf("0.7")
+    y = mp.mpf("-1.3")
+    a = c = mp.mpf(1)
+    b = mp.mpf(0)
     if theta:
         a = mp.sin(theta) / theta
         b = (1 - mp.cos(theta)) / theta

@@ -1,4 +1,5 @@
-"""Odd harmonics of the velocity on the sphere of directions, of three joint rates and more."""
+"""Odd harmonics of the velocity on the sphere of directions, of three joint rates and
+more."""
 
 import numpy as np
 import pytest
@@ -19,17 +20,17 @@ GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 
 
 def cubic(alpha, alphadot):
-    """Odd and of degree one in alphadot, a polynomial of degree 3 on the sphere; no two joints are alike."""
+    """Odd and of degree one in alphadot, a polynomial of degree 3 on the sphere; no two
+    joints are alike."""
     a, u = np.broadcast_arrays(alpha, alphadot)
+    first = u[..., 0]
+    second = u[..., 1]
+    last = u[..., -1]
     square = (u**2).sum(-1)
-    rows = [
-        a[..., 0] * u[..., 0] + 0.3 * u[..., 0] ** 2 * u[..., 2] / square,
-        u[..., 1] * a[..., 2] + 0.7 * u[..., 0] * u[..., 1] * u[..., -1] / square,
-        0.2 * u[..., -1]
-        + 0.5 * a[..., 1] * u[..., 1] ** 3 / square
-        - 0.4 * u[..., -1] ** 2 * u[..., 1] / square,
-    ]
-    return np.stack(rows, -1)
+    x = a[..., 0] * first + 0.3 * first**2 * u[..., 2] / square
+    y = second * a[..., 2] + 0.7 * first * second * last / square
+    turn = 0.5 * a[..., 1] * second**3 - 0.4 * last**2 * second
+    return np.stack([x, y, 0.2 * last + turn / square], -1)
 
 
 @pytest.mark.parametrize(("joints", "highest"), [(3, 3), (3, 7), (4, 3), (5, 3)])

@@ -1,4 +1,4 @@
-"""Formulas: they are what the numbers are, in lowest terms, and what is known by hand."""
+"""Formulas: they are what the numbers are, in lowest terms, and known by hand."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,5 @@
-"""Systems: what the geometry asks of them; the no-slip snake against its closed form, its singular shapes left out."""
+"""Systems: what the geometry asks of them; the no-slip snake against its closed form,
+its singular shapes left out."""
 
 import dataclasses
 

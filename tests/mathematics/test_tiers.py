@@ -212,7 +212,8 @@ def test_direct_estimates_cover_the_truth(truths):
     """80 random scenes against 2048 phases at a regularisation of 1e-9: positions and
     headings."""
     rng = np.random.default_rng(7)
-    estimates, errors = [], []
+    estimates = []
+    errors = []
     for _ in range(80):
         some = random_scene(rng)
         loads = ("exact", "exact", "midpoint:20")[rng.integers(3)]
@@ -231,7 +232,8 @@ def test_direct_estimates_cover_the_truth(truths):
 def test_look_up_estimates_cover_the_truth(truths):
     rng = np.random.default_rng(8)
     tiers = [tier for tier in TIERS if tier != "direct"]
-    estimates, errors = [], []
+    estimates = []
+    errors = []
     for _ in range(12):
         some = random_scene(rng)
         system = some.system
@@ -369,7 +371,7 @@ def test_estimates_are_in_body_lengths_and_in_tables_in_the_unit_of_their_poses(
 
 
 def test_a_tier_is_one_expression(own_parts):
-    """The constant of the connection alone: predicted, foretold, and judged like any."""
+    """The constant of the connection alone: predicted and judged like any."""
 
     def plan(system, numerics, gait, amplitudes):
         def straight(A, some):

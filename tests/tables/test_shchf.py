@@ -1,4 +1,4 @@
-"""Gaits of sysplotter's: in numbers, as coefficients, as points, and as the paths that it computed."""
+"""Gaits of sysplotter: numbers, coefficients, points, and paths that it computed."""
 
 import dataclasses
 
@@ -19,7 +19,8 @@ from rft.core.refusal import Refusal
 
 T = np.linspace(0, 2 * np.pi, 201)
 CIRCLE = Circle(amplitude=0.8, centre=(0.3, -0.2))
-# Of shchf_LowRe_MaxDisplacement.m and shchf_LowRe_MaxEfficiency.m (GeometricSystemPlotter, MIT).
+# Of shchf_LowRe_MaxDisplacement.m and shchf_LowRe_MaxEfficiency.m
+# (GeometricSystemPlotter, MIT).
 DISPLACEMENT = (
     2.0179559064,
     1.3533851447,

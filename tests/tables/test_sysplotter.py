@@ -1,4 +1,4 @@
-"""sysplotter's struct s: read as it saves it, and written so that its scripts read it."""
+"""The struct s of sysplotter: read as it saves it, and written for its scripts."""
 
 import sys
 
@@ -356,7 +356,7 @@ def spoilt(value):
         (
             ("grid", "eval"),
             lambda x: cell(np.array([y.T for y in x.ravel()]), (2,)),
-            "has s.grid.eval{1} that does not change along dimension 1 alone: as ndgrid",
+            "has s.grid.eval{1} that does not change along dimension 1 alone: as nd",
         ),
         (
             ("grid", "eval", (0, 0)),

@@ -1,4 +1,4 @@
-"""Geometry on stored connections: body frames, metrics, and what is computed with them, as of the systems they came from."""
+"""Body frames and metrics of stored connections, as of the systems they came from."""
 
 import numpy as np
 import pytest
