@@ -5,8 +5,7 @@ import pytest
 from registry import BODIES
 
 from rft import Chain
-from rft.formulas.link import Load
-from rft.formulas.newton import element_net, to_element, to_frame
+from rft.formulas.newton import to_element, to_frame
 
 CHAINS = [name for name, body in BODIES.items() if isinstance(body, Chain)]
 
@@ -69,25 +68,6 @@ def test_carried_and_wrench_are_transposes():
     power = (force * np.stack(to_element(motion, *xi))).sum((0, 1))
     wrench = np.stack(to_frame(motion, *force)).sum(1)
     np.testing.assert_allclose(power, (xi * wrench).sum(0), rtol=1e-12)
-
-
-def test_the_sum_over_elements_has_the_tangents_of_their_loads():
-    rng = np.random.default_rng(2)
-    motion = BODIES["uneven"].motion(*rng.normal(size=(2, 2, 6)))
-    force, v = rng.normal(size=(2, 3, 3, 6))
-    H = rng.normal(size=(3, 3, 3, 6))
-    load = Load(*(x for row in range(3) for x in (force[row], *H[row])))
-    net = element_net(motion, load, v, 0.7)
-
-    def wrench(f):
-        return np.stack(to_frame(motion, *(motion.weight * f))).sum(1)
-
-    np.testing.assert_allclose(np.sum(net.force, 1), wrench(force), rtol=1e-12)
-    units = [to_element(motion, *unit) for unit in np.eye(3)]
-    for column, by in zip((*net[1:4], net.by_speed), (*units, v)):
-        rates = np.stack(np.broadcast_arrays(*by, motion.c)[:3])
-        tangent = 0.7 * wrench(np.einsum("ijnb,jnb->inb", H, rates))
-        np.testing.assert_allclose(np.sum(column, 1), tangent, rtol=1e-10, atol=1e-12)
 
 
 @pytest.mark.parametrize(

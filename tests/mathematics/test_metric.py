@@ -97,20 +97,6 @@ def test_in_sand_length_is_work():
     assert looked_up == pytest.approx(work, rel=2e-3)
 
 
-@pytest.mark.parametrize(("degree", "order"), [(3, 4), (5, 6)])
-def test_it_converges_with_the_grid(degree, order):
-    """Length of the path of an off-centre loop, of unequal links."""
-    of_rates = power(FLUID, Chain((0.7, 1.4, 0.9)))
-    gait = Ellipse(semi_axes=(1.0, 0.6), tilt=0.7, centre=(0.2, -0.1))
-    lengths = []
-    for points in (11, 41, 81):
-        fitted = metric.fit(of_rates, connection.grid(2, points, 2.0), degree)
-        lengths.append(metric.path_length(fitted.norm, gait, [1.0])[0])
-    coarse, fine = np.abs(lengths[:2] - lengths[2])
-    assert np.log(coarse / fine) / np.log(40 / 10) > order - 0.7
-    assert fine < 1e-6
-
-
 @pytest.mark.parametrize("medium", [FLUID, SAND])
 def test_indicatrix_has_unit_cost(medium, viscous):
     table = viscous

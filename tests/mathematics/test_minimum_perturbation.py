@@ -8,8 +8,8 @@ import pytest
 from scipy.io import netcdf_file
 
 from geomech import scenes
-from geomech.mathematics.gaits import Circle, Ellipse
-from geomech.mathematics.geometry import connection, coordinates, curvature
+from geomech.mathematics.gaits import Circle
+from geomech.mathematics.geometry import connection, curvature
 from geomech.mathematics.geometry.minimum_perturbation import (
     Basis,
     minimum_perturbation,
@@ -17,8 +17,6 @@ from geomech.mathematics.geometry.minimum_perturbation import (
 from geomech.mathematics.geometry.representations.field import Field
 from geomech.mathematics.systems import Swimmer
 from geomech.mathematics.tiers.area import area
-from geomech.mathematics.tiers.direct import direct
-from geomech.mathematics.tiers.path import path
 from geomech.studies.maps import fields
 from geomech.studies.scene_tables import SceneTables
 from rft import Chain, ConstantCurvature, Serpenoid, Viscous
@@ -110,22 +108,6 @@ def test_no_frame_nearby_has_a_smaller_connection(moved, rows, seed):
     assert abs(slope) < 0.1
 
 
-def test_a_frame_that_only_turns_or_shifts_is_undone():
-    """A connection that is all gauge, -h^-1 dh seen from h, vanishes in the frame that
-    is found."""
-    axes = connection.grid(2, 41, 1.5)
-    a, b = np.meshgrid(*axes, indexing="ij")
-    x = 0.2 * np.sin(a - 0.5 * b)
-    y = 0.3 * np.cos(0.7 * a) - 0.1 * b
-    field = Field(axes, np.stack([x, y, 0.5 * np.sin(a + 0.4 * b)]))
-    zero = np.zeros((3, 41, 41))
-    nothing = connection.Connection(axes, np.zeros((3, 2, 41, 41)), zero, zero)
-    gauge = dataclasses.replace(minimum_perturbation(nothing), field=field)
-    turned = dataclasses.replace(nothing, A=gauge.connection(nothing))
-    assert np.abs(turned.A).max() > 0.4
-    assert np.abs(smallest(turned).A).max() < 1e-4
-
-
 def test_it_converges_with_the_grid():
     shapes = np.array([[0.9, -1.3], [2.2, 1.7], [-0.4, 0.3]])
     poses = []
@@ -136,26 +118,6 @@ def test_it_converges_with_the_grid():
     coarse, fine = (np.abs(pose - poses[-1]).max() for pose in poses[:2])
     assert fine < 1e-5
     assert np.log2(coarse / fine) / 2 > 2.8
-
-
-@pytest.mark.parametrize(
-    "gait",
-    [
-        Circle(amplitude=0.9, centre=(0.2, -0.1)),
-        Ellipse(semi_axes=(1.0, 0.4), tilt=0.7),
-    ],
-)
-def test_displacements_agree_with_other_frames(gait):
-    body = Chain((0.7, 1.4, 0.9), frame="link-1")
-    first = fitted(body, 61)
-    velocity = Swimmer(FLUID, body).velocity
-    frame = minimum_perturbation(first)
-    own = direct(velocity, gait)
-    there = frame.net(own, gait.shape(np.zeros(1))[0])
-    found = direct(coordinates.in_frame(velocity, frame), gait, phases=512)
-    np.testing.assert_allclose(found, there, atol=1e-8)
-    assert path(smallest(first), gait) == pytest.approx(there, abs=2e-5)
-    assert np.abs(there - own).max() > 1e-3
 
 
 @pytest.mark.parametrize(

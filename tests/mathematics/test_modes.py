@@ -7,7 +7,6 @@ import pytest
 import rft
 from geomech import scenes
 from geomech.mathematics.gaits import Circle, Fourier, Wave
-from geomech.mathematics.geometry import connection, curvature
 from geomech.mathematics.systems import Swimmer, Table
 from geomech.mathematics.systems.base import shape_labels
 from geomech.scenes import Scene
@@ -66,22 +65,6 @@ def test_tiers_are_those_of_the_plain_chain(tier, effects):
         coarse = scene.with_numerics(phases=24, curves=6, cycles=1, pieces=9)
         poses.append(SceneTables(coarse).poses(tier, None, [0.5, 1.0]))
     np.testing.assert_allclose(*poses, atol=1e-13)
-
-
-def test_connection_and_ccf_are_pulled_back():
-    """A_j = sum over k of modes[j][k] A_k, and the CCF is the plain chain's times the
-    modes' area: m_1 turns joint 2 by a quarter of itself, m_2 joint 1 by a half."""
-    links = {"lengths": (1, 1.5, 0.8), "frame": "link-1"}
-    axes = connection.grid(2, 9, 2.0)
-    modes = Swimmer(Viscous(3.0), Chain(**links, modes=((0, 0.25), (0.5, 0))))
-    chain = Swimmer(Viscous(3.0), Chain(**links))
-    fitted = connection.fit(modes.velocity, axes)
-    plain = connection.fit(chain.velocity, (axes[0] / 2, axes[1] / 4))
-    for k, j, factor in ((0, 1, 0.25), (1, 0, 0.5)):
-        column = factor * plain.A[:, j].swapaxes(1, 2)
-        np.testing.assert_allclose(fitted.A[:, k], column, atol=1e-13)
-    found, expected = (curvature.ccf(c).values for c in (fitted, plain))
-    np.testing.assert_allclose(found, -expected.swapaxes(1, 2) / 8, atol=1e-12)
 
 
 @pytest.mark.parametrize("tier", ["path", "direct"])

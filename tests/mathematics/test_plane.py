@@ -10,7 +10,6 @@ from tabled import of_json, tabled
 
 from geomech import Numerics, Scene
 from geomech.io.results import to_xarray
-from geomech.io.tables import load
 from geomech.mathematics.gaits import Circle, Fourier, Wave
 from geomech.mathematics.geometry import connection, curvature
 from geomech.mathematics.geometry.representations.plane import (
@@ -268,9 +267,8 @@ def test_pairs_are_antisymmetric_and_those_of_curvature(fluid):
         np.testing.assert_array_equal(form.pair(i, j).values, values)
         np.testing.assert_array_equal(form.pair(j, i).values, -values)
     alpha, u, v = np.random.default_rng(0).uniform(-1, 1, (3, 5, 3))
-    assert form(alpha, u, v) == pytest.approx(-form(alpha, v, u), abs=1e-14)
     twice = form(alpha, u, 2 * v + 3 * u)
-    assert twice == pytest.approx(2 * form(alpha, u, v), abs=1e-13)
+    np.testing.assert_allclose(twice, -2 * form(alpha, v, u), atol=1e-13)
 
 
 def test_with_two_joints_every_surface_is_the_area():
@@ -282,21 +280,6 @@ def test_with_two_joints_every_surface_is_the_area():
     expected = area(curvature.ccf(fitted), gait, [0.4, 1.0])
     assert found.net == pytest.approx(expected, abs=1e-8)
     assert found.spread.max() < 1e-8
-
-
-def test_a_closed_form_does_not_see_the_surface(fluid):
-    """The exact form d(alpha_1 alpha_2 dalpha_3) has the integral along the loop."""
-    form = two_form(fluid)
-    x, y, _ = np.meshgrid(*form.field.axes, indexing="ij")
-    values = np.zeros_like(form.field.values)
-    values[1, 2] = y  # on (0, 2), turning
-    values[2, 2] = x  # on (1, 2)
-    field = dataclasses.replace(form.field, values=values)
-    found = spanned(dataclasses.replace(form, field=field), LOOP, [0.3, 0.8])
-    alpha, alphadot = LOOP.cycle(256, [0.3, 0.8])
-    along = (alpha[..., 0] * alpha[..., 1] * alphadot[..., 2]).mean(-1) * 2 * np.pi
-    assert found.net[:, 2] == pytest.approx(along, abs=1e-12)
-    assert found.spread.max() < 1e-12
 
 
 @pytest.mark.parametrize(
@@ -375,17 +358,13 @@ def test_a_file_of_three_joints_has_all_pairs(tmp_path):
     numerics = Numerics(grid=7, extent=1.2)
     study = SceneTables(Scene(Swimmer(Viscous(2.3), FOUR_LINKS), LOOP, numerics))
     fields.save_connection(tmp_path / "a.nc", study)
-    A = load(tmp_path / "a.nc").connection.A
-    np.testing.assert_array_equal(A, study.fitted.A)
     table = SceneTables(Scene(Table(tmp_path / "a.nc"), LOOP))
     assert table.tiers == ("area", "adapted", "path", "direct")
+    np.testing.assert_array_equal(table.fitted.A, study.fitted.A)
     data = to_xarray(fields.full_result(study))
-    pairs = data["ccf_pairs"]
-    assert pairs.dims[:2] == ("pair", "component")
     assert data["pair_joints"].values.tolist() == [[1, 2], [1, 3], [2, 3]]
-    np.testing.assert_array_equal(pairs[1], study.two_form.pair(0, 2).values)
-    error = curvature.error(study.fitted, 1, 2).values
-    np.testing.assert_array_equal(data["ccf_pairs_error"][2], error)
+    second = study.two_form.pair(0, 2).values
+    np.testing.assert_array_equal(data["ccf_pairs"][1], second)
 
 
 def test_commands_tell_the_spread_and_the_angle_of_a_slice(tmp_path):

@@ -56,16 +56,6 @@ def test_the_snake_moves_as_its_closed_form(length):
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
 
 
-def test_a_cycle_tells_the_mean_rate_of_each_gait():
-    """|alphadot| over the joints, averaged over the phases."""
-    alpha, alphadot = AWAY.cycle(16, np.array([0.5, 0.8]))
-    expected = np.linalg.norm(alphadot, axis=-1).mean(-1)
-    speed = NoSlipSnake().run(alpha, alphadot).speed
-    np.testing.assert_allclose(speed, expected, rtol=1e-14)
-    alone = NoSlipSnake().run(alpha[1], alphadot[1]).speed
-    np.testing.assert_allclose(alone, expected[1], rtol=1e-14)
-
-
 @pytest.mark.parametrize("frame", ["mean", "link-1", "link-3"])
 def test_no_wheel_slips_in_any_frame(frame):
     """Of uneven links; and the motion is that of the middle link's frame."""
@@ -115,20 +105,6 @@ def test_singular_shapes_are_left_out_of_fields(lengths):
     for field in (study.curvature, study.curvature_error):
         assert (np.isnan(field.values[0]) >= masked).all()
         assert np.isnan(field.values[0]).sum() <= masked.sum() + 10
-
-
-def test_the_ccf_of_the_snake_away_from_singular_shapes_is_that_of_its_formula():
-    study = SceneTables(Scene(NoSlipSnake(frame="link-2"), AWAY))
-    study = study.with_numerics(grid=41, extent=2.0)
-    a, b = np.meshgrid(*study.fitted.axes, indexing="ij")
-    far = np.abs(a - b) > 1.0
-    A, alpha = closed_form()
-    formula = sp.lambdify(alpha, list(symbolic.ccf(A, alpha)))
-    expected = np.stack(formula(a[far], b[far]))
-    found = study.curvature.values[:, far]
-    np.testing.assert_allclose(found, expected, atol=2e-3)
-    error = study.curvature_error.values[:, far]
-    assert (np.abs(found - expected) <= error + 1e-9).mean() > 0.9
 
 
 CROSSING = Circle(amplitude=0.9, centre=(0.6, 0.0))

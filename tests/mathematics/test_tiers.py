@@ -64,16 +64,6 @@ def test_harmonics_predict_circles_within_a_percent(truth):
     assert off(butterfly, truth["butterfly"]) < 0.01
 
 
-def test_all_harmonics_reproduce_the_samples():
-    axes = connection.grid(2, 5, 2.0)
-    full = harmonics.fit(GLASS.system.velocity, axes, 12, highest=11)
-    assert full.residual.max() < 1e-12
-    alpha = np.array([axes[0][1], axes[1][2]])
-    rates = 2 * connection.directions(2, 12)
-    found = full.velocity(alpha, rates)
-    np.testing.assert_allclose(found, GLASS.system.velocity(alpha, rates), atol=1e-8)
-
-
 def test_adapted_area_predicts_its_family(truth):
     """The CCF's area integral, uniform: +50 to -29 % on circles."""
     butterfly = STUDY.poses("adapted", Butterfly(), SCALES)
@@ -114,30 +104,6 @@ def test_the_map_of_a_family_integrates_to_its_area(gait):
     place = se2.rotated(table.heading[-1, 0], *moved[:2])
     atol = 0.004 * np.abs(moved).max()
     np.testing.assert_allclose(total, [*place, moved[2]], atol=atol)
-
-
-def test_the_map_of_a_family_gives_each_shape_its_own_value():
-    """Where nothing turns: the slope across the curves of the velocity along them."""
-    centre = np.array([0.3, -0.2])
-
-    def pull(alpha, rate):
-        a, b = np.moveaxis(alpha, -1, 0)
-        return (a**2 + 0.5 * a * b) * rate[..., 1]
-
-    def velocity(alpha, rate):
-        return pull(alpha, rate)[..., None] * np.array([1.0, 0.0, 0.0])
-
-    alpha, ccf = family.fit(velocity, Circle(centre=tuple(centre)), 1.0, 16, 24).ccf()
-    known = np.isfinite(ccf[..., 0])
-    assert known.mean() > 0.9
-    a = np.linalg.norm(alpha[known] - centre, axis=-1)[:, None]
-    out = (alpha[known] - centre) / a
-    along = np.stack([-out[:, 1], out[:, 0]], -1)
-    h = 1e-4
-    up, down = (pull(centre + b * out, b * along) for b in (a + h, a - h))
-    expected = (up - down) / (2 * h) / a[:, 0]
-    np.testing.assert_allclose(ccf[known][:, 0], expected, atol=1e-6)
-    np.testing.assert_allclose(ccf[known][:, 1:], 0, atol=1e-12)
 
 
 GRID = connection.grid(2, 5)
@@ -455,12 +421,3 @@ def test_every_tier_takes_negative_and_zero_amplitudes_alike(tier):
     np.testing.assert_allclose(STUDY.poses(tier, GENERIC, [0.0, 0.0]), 0.0, atol=1e-15)
     own = dataclasses.replace(GENERIC, amplitude=-1.0)
     np.testing.assert_allclose(STUDY.poses(tier, own), found[0], **close)
-
-
-def test_the_adapted_tier_is_near_the_truth_on_both_sides():
-    truth, found = (STUDY.poses(tier, GENERIC, A) for tier in ("direct", "adapted"))
-    np.testing.assert_allclose(found, truth, atol=5e-3 * np.abs(truth).max())
-    shapes, values = STUDY.table("adapted", GENERIC, A).ccf()
-    reflected = family.fit(GLASS.system.velocity, TURNED, 1.0).ccf()
-    np.testing.assert_allclose(shapes[23::-1], reflected[0][1:], atol=1e-12)
-    np.testing.assert_allclose(values[23::-1], reflected[1][1:], rtol=1e-6, atol=1e-9)

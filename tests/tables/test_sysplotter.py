@@ -9,13 +9,8 @@ from structs import cell, computed, save, struct
 
 import rft
 from geomech.io import tables
-from geomech.io.tables import sysplotter
-from geomech.io.tables.base import Stored
 from geomech.mathematics.gaits import Circle
 from geomech.mathematics.geometry import connection
-from geomech.mathematics.geometry.connection import Connection
-from geomech.mathematics.geometry.curvature import ccf
-from geomech.mathematics.geometry.minimum_perturbation import minimum_perturbation
 from geomech.mathematics.systems import (
     DifferentialDrive,
     IdealFluidSwimmer,
@@ -136,28 +131,6 @@ def test_a_connection_that_its_body_would_have_with_other_axes_is_noted(
 def test_explain_says_how_far_its_own_numbers_are_from_ours(tmp_path):
     text = "\n".join(system_lines(Table(write(tmp_path / "s.mat"))))
     assert "CCF of joints 1 and 2 11 %, minimum-perturbation frame 1.6 %" in text
-
-
-@pytest.mark.parametrize(("place", "share"), [(3, 0.02), (2, 0), (11, 0.02), (12, 0)])
-def test_its_own_numbers_are_compared_in_the_middle_half_of_the_grid(place, share):
-    """They differ by a share of the largest value at one place."""
-    c = computed()[0]
-    frame = minimum_perturbation(c)
-    inner = Connection(c.axes, frame.connection(c), c.residual, c.speed, c.degree)
-    theirs = {}
-    for name, values in (
-        ("ccf", ccf(c).values[:, None]),
-        ("beta", frame.field.values.copy()),
-        ("ccf_optimised", ccf(inner).values[:, None]),
-    ):
-        values[0, ..., place, 7] -= 0.02 * np.abs(values[0]).max()
-        theirs[name] = values
-    found = sysplotter.compared(Stored(c, computed=sysplotter.Computed(**theirs)))
-    assert found == {
-        "CCF of joints 1 and 2": pytest.approx(share, abs=1e-9),
-        "minimum-perturbation frame": pytest.approx(share, abs=1e-9),
-        "CCF in that frame": pytest.approx(share, abs=1e-9),
-    }
 
 
 # The struct part by part, on an uneven grid.
@@ -498,18 +471,6 @@ def test_links_of_version_7_3_are_refused_by_place(change, said, tmp_path):
     with h5py.File(path, "r+") as file:
         change(file, h5py)
     with pytest.raises(Refusal, match=said):
-        tables.load(path)
-
-
-def test_a_damaged_cell_of_version_7_3_is_refused_by_place(tmp_path):
-    h5py = pytest.importorskip("h5py")
-    path = write(tmp_path / "s.mat", 7.3)
-    with h5py.File(path, "r+") as file:
-        place = file[file["s/grid/eval"][0, 0]].id.get_chunk_info(0).byte_offset
-    raw = bytearray(path.read_bytes())
-    raw[place + 40] ^= 8
-    path.write_bytes(raw)
-    with pytest.raises(Refusal, match=r"is damaged at s.grid.eval\{1, 1\}: save it in"):
         tables.load(path)
 
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from commands import geomech
 from scipy.io import loadmat, savemat
 
 import rft
@@ -187,22 +186,6 @@ def test_a_metric_of_a_file_from_elsewhere_is_no_power(sources, tmp_path):
     np.testing.assert_array_equal(table.metric.M, study.metric.M)
     assert effort.units(table.scene.system)["path_length"] == effort.METRIC_UNIT
     assert np.isnan(table.effort()["work"]).all()
-
-
-def test_the_most_efficient_gait_of_a_table_is_that_of_its_source(sources, tmp_path):
-    source, files = sources["viscous"]
-    text = f'[system]\nkind = "table"\nfile = "{files[".mat"]}"\n'
-    text += '[gait]\nkind = "circle"\namplitude = 0.8\n'
-    (tmp_path / "t.toml").write_text(text)
-    options = ("--objective", "efficiency", "--harmonics", "1", "-o", "best.toml")
-    code, _, err = geomech("optimize", "t.toml", *options, cwd=tmp_path)
-    assert code == 0, err
-    gait = scenes.load(tmp_path / "best.toml").gait
-    efficiency = []
-    for study in (on(files[".mat"]), source):
-        distance = np.hypot(*study.poses("direct", gait, [1.0])[0, :2])
-        efficiency.append(distance / study.effort(gait, [1.0])["path_length"][0])
-    assert efficiency[0] == pytest.approx(efficiency[1], rel=2e-3)
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,6 @@ from geomech import api, scenes
 from geomech.io import tables
 from geomech.io.tables import base
 from geomech.mathematics.gaits import Butterfly, Circle, Ellipse, Fourier
-from geomech.mathematics.geometry import connection
 from geomech.mathematics.geometry.connection import Connection
 from geomech.mathematics.systems import NoSlipSnake, Swimmer, Table
 from geomech.mathematics.systems.base import length_unit
@@ -338,21 +337,6 @@ def test_what_is_even_in_alphadot_is_part_of_the_error(ending, tmp_path):
         poses, errors = estimate.direct(table, gait, amplitudes, 128)
         true = source.poses("direct", gait, amplitudes)
         assert (estimate.pose_distance(poses, true, 0.3) <= errors).all()
-
-
-def test_the_even_part_is_an_rms_and_goes_through_files(tmp_path):
-    source = study(effects=SCALY)
-    swimmer = source.scene.system
-    alpha = np.array([source.fitted.axes[0][3], source.fitted.axes[1][6]])
-    unit = connection.directions(2, 8)
-    both = swimmer.velocity(alpha, unit) + swimmer.velocity(alpha, -unit)
-    rms = np.sqrt((both**2).mean(0))
-    np.testing.assert_allclose(source.even_part[:, 3, 6], rms, rtol=1e-6)
-    assert study().even_part is None
-    fields.save_connection(tmp_path / "a.nc", source)
-    fields.save_connection(tmp_path / "b.nc", on(tmp_path / "a.nc"))
-    again = tables.load(tmp_path / "b.nc").even
-    np.testing.assert_array_equal(again, source.even_part)
 
 
 def test_a_bare_mat_file_goes_through_netcdf_without_a_residual(made, tmp_path):
