@@ -248,7 +248,9 @@ def test_the_integral_by_stokes_is_that_of_the_two_form():
     form = two_form(connection.fit(Cubic().velocity, axes, 12, 5))
     found = spanned(form, LOOP, [0.5, 1.0], 128, 2)
     by_stokes = spanned_by(Cubic().A, LOOP, [0.5, 1.0], 128, 2, 128)
+    assert found.others.shape == (2, 2, 3)
     np.testing.assert_allclose(found.net, by_stokes.net, atol=1e-12)
+    np.testing.assert_allclose(found.others, by_stokes.others, atol=1e-12)
     np.testing.assert_allclose(found.spread, by_stokes.spread, atol=1e-12)
 
 

@@ -107,6 +107,19 @@ def test_singular_shapes_are_left_out_of_fields(lengths):
         assert np.isnan(field.values[0]).sum() <= masked.sum() + 10
 
 
+def test_the_ccf_of_the_snake_away_from_singular_shapes_is_that_of_its_formula():
+    study = snake().with_numerics(grid=41, extent=2.0)
+    first, second = np.meshgrid(*study.fitted.axes, indexing="ij")
+    far = np.abs(first - second) > 1.0
+    A, alpha = closed_form()
+    formula = sp.lambdify(alpha, list(symbolic.ccf(A, alpha)))
+    expected = np.stack(formula(first[far], second[far]))
+    found = study.curvature.values[:, far]
+    np.testing.assert_allclose(found, expected, atol=2e-3)
+    error = study.curvature_error.values[:, far]
+    assert (np.abs(found - expected) <= error + 1e-9).mean() > 0.9
+
+
 CROSSING = Circle(amplitude=0.9, centre=(0.6, 0.0))
 
 

@@ -474,6 +474,27 @@ def test_links_of_version_7_3_are_refused_by_place(change, said, tmp_path):
         tables.load(path)
 
 
+@pytest.mark.parametrize(
+    ("first", "place"),
+    [
+        (lambda file: file[file["s/grid/eval"][0, 0]], r"s.grid.eval\{1, 1\}"),
+        (lambda file: file["s/geometry/length"], "s.geometry.length"),
+    ],
+)
+def test_damaged_numbers_of_version_7_3_are_refused_by_place(first, place, tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path = write(tmp_path / "s.mat", 7.3)
+    with h5py.File(path, "r+") as file:
+        start = first(file).id.get_chunk_info(0).byte_offset
+    raw = bytearray(path.read_bytes())
+    raw[start : start + 8] = b"\xff" * 8
+    path.write_bytes(raw)
+    with pytest.raises(
+        Refusal, match=f"is damaged at {place}: save it in MATLAB again"
+    ):
+        tables.load(path)
+
+
 # Structs that we write.
 
 
