@@ -1,22 +1,35 @@
-"""The metric of shape space against known numbers, quadratic forms and the work of gaits."""
+"""The metric of shape space against known numbers and the work of gaits, and shape
+space redrawn by it."""
+
+import collections
 
 import numpy as np
 import pytest
+from scipy.linalg import sqrtm
 
+from geomech import plots
 from geomech.mathematics.gaits import Circle, Ellipse
 from geomech.mathematics.geometry import connection, metric
+from geomech.mathematics.geometry.representations.field import Field
+from geomech.mathematics.geometry.stretch import inverted_fraction, stretch
 from geomech.mathematics.systems import Swimmer
 from rft import Chain, Granular, Viscous
 
 pytestmark = pytest.mark.usefixtures("fastest")
-FLUID, SAND, EQUAL = Viscous(2.0), Granular(C=1.8, gamma0=np.radians(13.8)), Chain()
+FLUID = Viscous(2.0)
+SAND = Granular(C=1.8, gamma0=np.radians(13.8))
+EQUAL = Chain()
+FOUR = Chain((1, 1, 1, 1))
 
 
 def power(medium, body=EQUAL):
     system = Swimmer(medium, body)
-    return lambda alpha, alphadot: (
-        system.work(alpha, alphadot, system.velocity(alpha, alphadot)).power
-    )
+
+    def of_rates(alpha, alphadot):
+        xi = system.velocity(alpha, alphadot)
+        return system.work(alpha, alphadot, xi).power
+
+    return of_rates
 
 
 @pytest.fixture(scope="module")
@@ -25,119 +38,73 @@ def viscous():
 
 
 def test_viscous_three_link_swimmer(viscous):
-    assert viscous.M[:, :, 15, 15] == pytest.approx(
-        np.array([[0.0073160, 0.0050297], [0.0050297, 0.0073160]]), abs=1e-7
-    )
-    assert metric.path_length(viscous.norm, Circle(), [1.0]) == pytest.approx(
-        [0.512235], abs=1e-6
-    )
-    assert metric.path_length(
-        lambda *a: np.sqrt(power(FLUID)(*a)), Circle(), [1.0]
-    ) == pytest.approx([0.512235], abs=1e-6)
+    """Published: [[0.0073160, 0.0050297], ...] at the straight shape."""
+    M = np.array([[0.0073160, 0.0050297], [0.0050297, 0.0073160]])
+    assert viscous.M[:, :, 15, 15] == pytest.approx(M, abs=1e-7)
+
+    def norm(alpha, alphadot):
+        return np.sqrt(power(FLUID)(alpha, alphadot))
+
+    for length in (viscous.norm, norm):
+        found = metric.path_length(length, Circle(), [1.0])
+        assert found == pytest.approx([0.512235], abs=1e-6)
 
 
 def test_the_metric_is_the_power_of_any_rate():
-    rng, body = np.random.default_rng(0), Chain((0.7, 1.4, 0.9, 0.5), length=0.3)
-    M = metric.fit(power(FLUID, body), connection.grid(3, 9, 1.0))
-    alpha, rate = rng.choice(M.axes[0], (50, 3)), rng.normal(size=(50, 3))
-    assert M.norm(alpha, rate) ** 2 == pytest.approx(
-        power(FLUID, body)(alpha, rate), rel=1e-10
-    )
+    rng = np.random.default_rng(0)
+    of_rates = power(FLUID, Chain((0.7, 1.4, 0.9, 0.5), length=0.3))
+    M = metric.fit(of_rates, connection.grid(3, 9, 1.0))
+    alpha = rng.choice(M.axes[0], (50, 3))
+    rate = rng.normal(size=(50, 3))
+    expected = of_rates(alpha, rate)
+    assert M.norm(alpha, rate) ** 2 == pytest.approx(expected, rel=1e-10)
     assert (np.linalg.eigvalsh(np.moveaxis(M.M, (0, 1), (-2, -1))) > 0).all()
 
 
 def test_a_norm_known_in_closed_form_comes_back():
-    """F = |u| (2 + cos a + 0.3 sin 2 beta + 0.1 cos 4 beta), which has harmonics 0, 2 and 4."""
+    """F = |u| (2 + cos a + 0.3 sin 2 beta + 0.1 cos 4 beta): harmonics 0, 2 and 4."""
     axes = connection.grid(2, 25, 1.0)
 
     def F(alpha, u):
         beta = np.arctan2(u[..., 1], u[..., 0])
-        return np.hypot(*np.moveaxis(u, -1, 0)) * (
-            2 + np.cos(alpha[..., 0]) + 0.3 * np.sin(2 * beta) + 0.1 * np.cos(4 * beta)
-        )
+        waves = 0.3 * np.sin(2 * beta) + 0.1 * np.cos(4 * beta)
+        return np.linalg.norm(u, axis=-1) * (2 + np.cos(alpha[..., 0]) + waves)
 
-    done: list[float] = []
+    done = []
     found = metric.fit_norm(F, axes, 12, progress=done.append, highest=6)
-    assert done == sorted(done) and done[-1] == 1.0
+    assert done[-1] == 1.0
     assert found.residual.max() < 1e-13
-    assert np.abs(found.coefficients[:, 3, 5]) == pytest.approx(
-        [2 + np.cos(axes[0][3]), 0, 0.3, 0.1, 0, 0, 0], abs=1e-13
-    )
+    expected = [2 + np.cos(axes[0][3]), 0, 0.3, 0.1, 0, 0, 0]
+    assert np.abs(found.coefficients[:, 3, 5]) == pytest.approx(expected, abs=1e-13)
     rng = np.random.default_rng(1)
-    alpha, u = rng.uniform(-0.9, 0.9, (40, 2)), rng.normal(size=(40, 2))
+    alpha = rng.uniform(-0.9, 0.9, (40, 2))
+    u = rng.normal(size=(40, 2))
     assert found.norm(alpha, u) == pytest.approx(F(alpha, u), abs=1e-5)
-    assert found.norm(alpha, -3 * u) == pytest.approx(
-        3 * found.norm(alpha, u), rel=1e-12
-    )
+    assert found.norm(alpha, -3 * u) == pytest.approx(3 * F(alpha, u), abs=1e-5)
 
 
 def test_in_sand_length_is_work():
-    gait, system = (
-        Ellipse(semi_axes=(1.0, 0.4), tilt=0.7, centre=(0.2, -0.1)),
-        Swimmer(SAND, Chain((0.7, 1.4, 0.9))),
-    )
-    table = metric.fit_norm(power(SAND, system.body), connection.grid(2, 31, 2.0))
+    system = Swimmer(SAND, Chain((0.7, 1.4, 0.9)))
+    gait = Ellipse(semi_axes=(1.0, 0.4), tilt=0.7, centre=(0.2, -0.1))
+    of_rates = power(SAND, system.body)
+    table = metric.fit_norm(of_rates, connection.grid(2, 31, 2.0))
     assert table.residual.mean() < 0.005 * table.coefficients[0].mean()
-    alpha, alphadot = gait.cycle(256, [0.5, 1.0])
-    work = system.run(alpha, alphadot, work=True).work.power.mean(-1) * 2 * np.pi
-    assert metric.path_length(
-        power(SAND, system.body), gait, [0.5, 1.0]
-    ) == pytest.approx(work, rel=1e-10)
-    assert metric.path_length(table.norm, gait, [0.5, 1.0]) == pytest.approx(
-        work, rel=2e-3
-    )
-
-
-@pytest.mark.parametrize(("degree", "order"), [(3, 4), (5, 6)])
-def test_it_converges_with_the_grid(degree, order):
-    """Length of the path of an off-centre loop, of unequal links, against the power itself."""
-    body, gait = (
-        Chain((0.7, 1.4, 0.9)),
-        Ellipse(semi_axes=(1.0, 0.6), tilt=0.7, centre=(0.2, -0.1)),
-    )
-    F = power(FLUID, body)
-    truth = metric.path_length(lambda *a: np.sqrt(F(*a)), gait, [1.0])
-    grids = np.array([11, 21, 41])
-    off = [
-        np.abs(
-            metric.path_length(
-                metric.fit(F, connection.grid(2, n, 2.0), degree).norm, gait, [1.0]
-            )
-            - truth
-        )[0]
-        for n in grids
-    ]
-    assert np.log(off[0] / off[-1]) / np.log(40 / 10) > order - 0.7
-    assert 0 < off[-1] < 1e-6
-
-
-def test_length_does_not_depend_on_pacing(viscous):
-    """The same loop run faster here and slower there."""
-    t = 2 * np.pi * np.arange(400) / 400
-    s, ds = t + 0.6 * np.sin(t), 1 + 0.6 * np.cos(t)
-    loop = np.stack([np.cos(s), 0.7 * np.sin(s)], -1)
-    rate = ds[:, None] * np.stack([-np.sin(s), 0.7 * np.cos(s)], -1)
-    paced = viscous.norm(loop, rate).mean()
-    even = viscous.norm(
-        np.stack([np.cos(t), 0.7 * np.sin(t)], -1),
-        np.stack([-np.sin(t), 0.7 * np.cos(t)], -1),
-    ).mean()
-    assert paced == pytest.approx(even, rel=1e-8)
+    run = system.run(*gait.cycle(256, [0.5, 1.0]), work=True)
+    work = run.work.power.mean(-1) * 2 * np.pi
+    exact = metric.path_length(of_rates, gait, [0.5, 1.0])
+    assert exact == pytest.approx(work, rel=1e-10)
+    looked_up = metric.path_length(table.norm, gait, [0.5, 1.0])
+    assert looked_up == pytest.approx(work, rel=2e-3)
 
 
 @pytest.mark.parametrize("medium", [FLUID, SAND])
 def test_indicatrix_has_unit_cost(medium, viscous):
-    table = (
-        viscous
-        if medium is FLUID
-        else metric.fit_norm(power(SAND), connection.grid(2, 15, 2.0))
-    )
+    table = viscous
+    if medium is SAND:
+        table = metric.fit_norm(power(SAND), connection.grid(2, 15, 2.0))
     where = np.array([[0.3, -0.8], [1.2, 1.0]])
     rates = table.indicatrix(where, 36)
-    assert rates.shape == (2, 36, 2)
-    assert table.norm(
-        np.broadcast_to(where[:, None], rates.shape), rates
-    ) == pytest.approx(np.ones((2, 36)))
+    assert table.norm(where[:, None] + 0 * rates, rates) == pytest.approx(1)
     assert np.arctan2(rates[..., 1], rates[..., 0])[:, 9] == pytest.approx(np.pi / 2)
 
 
@@ -153,6 +120,13 @@ def test_indicatrix_has_unit_cost(medium, viscous):
                 lambda a, u: np.nan * (a[..., 0] + u[..., 0]), connection.grid(2, 5)
             ),
             "power must be finite",
+        ),
+        (lambda: stretch(constant(np.eye(2)), 3), "points must be"),
+        (lambda: stretch(constant(np.eye(2)), 7.5), "points must be"),
+        (lambda: stretch(constant(np.zeros((2, 2)))), "costs nothing"),
+        (
+            lambda: stretch(metric.fit(power(FLUID, FOUR), connection.grid(3, 5, 0.5))),
+            "two joints",
         ),
         (
             lambda: metric.fit_norm(power(SAND), connection.grid(3, 5)),
@@ -171,3 +145,138 @@ def test_indicatrix_has_unit_cost(medium, viscous):
 def test_what_makes_no_metric_is_refused(make, said):
     with pytest.raises(ValueError, match=said):
         make()
+
+
+# Shape space redrawn by what it costs.
+
+
+def constant(M):
+    axes = connection.grid(2, 9, 1.5)
+    return metric.Metric(axes, np.array(M)[..., None, None] * np.ones((9, 9)))
+
+
+def shapes(axes):
+    return np.stack(np.meshgrid(*axes, indexing="ij"))
+
+
+@pytest.mark.parametrize("M", [np.eye(2), np.array([[2.0, 0.7], [0.7, 0.5]])])
+def test_a_constant_metric_becomes_its_root(M):
+    found = stretch(constant(M))
+    expected = np.einsum("ij,jkl->ikl", sqrtm(M), shapes(found.field.axes))
+    assert found.field.values == pytest.approx(expected, abs=1e-10)
+    area = np.full((9, 9), np.sqrt(np.linalg.det(M)))
+    assert found.area.values == pytest.approx(area, rel=1e-9)
+    assert found.largest < 1e-9
+    assert found.folded == 0
+
+
+def bent(alpha):
+    """A plane in curved coordinates."""
+    x, y = np.moveaxis(alpha, -1, 0)
+    u = x + 0.3 * np.sin(y) + 0.1 * x**2
+    return np.stack([u, 1.4 * y + 0.2 * x**2 - 0.2 * x], -1)
+
+
+def pulled_back(alpha, rate):
+    """Its metric."""
+    x, y = np.moveaxis(alpha, -1, 0)
+    u, v = np.moveaxis(rate, -1, 0)
+    first = (1 + 0.2 * x) * u + 0.3 * np.cos(y) * v
+    return first**2 + ((0.4 * x - 0.2) * u + 1.4 * v) ** 2
+
+
+def test_a_flat_metric_in_disguise_is_flattened():
+    """By order 2; the middle stays."""
+    off = []
+    left = []
+    for points in (11, 21):
+        found = stretch(metric.fit(pulled_back, connection.grid(2, points, 1.5)))
+        middle = found.field.values[:, points // 2, points // 2]
+        assert np.abs(middle).max() < 1e-12
+        true = bent(np.moveaxis(shapes(found.field.axes), 0, -1)).reshape(-1, 2)
+        u = found.field.values.reshape(2, -1).T
+        true -= true.mean(0)
+        u = u - u.mean(0)
+        turn, _, back = np.linalg.svd(u.T @ true)
+        off.append(np.abs(u @ turn @ back - true).max())
+        left.append(found.rms)
+    for errors in (off, left):
+        assert errors[0] < 2e-3
+        assert np.log2(errors[0] / errors[1]) > 1.8
+
+
+def cap(alpha, rate):
+    """Of the unit sphere in longitude and latitude."""
+    return np.cos(alpha[..., 1]) ** 2 * rate[..., 0] ** 2 + rate[..., 1] ** 2
+
+
+def test_a_sphere_does_not_lie_flat():
+    """The residual tells it, and grows with the cap."""
+    small, large = (
+        stretch(metric.fit(cap, connection.grid(2, 15, extent)))
+        for extent in (0.3, 0.9)
+    )
+    assert 1e-4 < small.rms < 0.02 < large.rms < large.largest < 0.5
+    assert np.log(large.rms / small.rms) / np.log(3) == pytest.approx(2, abs=0.3)
+    assert large.distortion.max() <= large.largest
+
+
+def test_displacement_is_density_times_area_on_paper():
+    found = stretch(metric.fit(pulled_back, connection.grid(2, 21, 1.5)))
+    x, y = shapes(connection.grid(2, 31, 1.5))
+    field = Field(connection.grid(2, 31, 1.5), np.stack([1 + 0 * x, x, x * y]))
+    here = np.moveaxis(shapes(found.field.axes), 0, -1)
+    expected = np.moveaxis(field(here), -1, 0)
+    assert found.density(field) * found.area.values == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("reverse", "word"), [(False, "backwards"), (True, "ahead")])
+def test_the_area_is_shaded_by_what_it_adds(reverse, word):
+    """CCF_x = -1: a counter-clockwise circle goes backwards, a clockwise one ahead."""
+    axes = connection.grid(2, 15, 1.5)
+    values = np.zeros((3, 15, 15))
+    values[0] = -1.0
+    gait = Circle(amplitude=0.8, reverse=reverse)
+    ax = plots.figure(3, 3)[1][0, 0]
+    drawn = plots.ccf_contours(Field(axes, values), 0, [gait], ax=ax)
+    assert [text.get_text() for text in drawn.get_legend().get_texts()] == [word]
+
+
+def test_the_distortion_at_a_shape_is_that_of_the_edges_that_meet_there():
+    """Each against the length of a straight line by a fine sum, of a cap of a sphere
+    that is longer than it is wide."""
+    axes = np.linspace(-0.9, 0.9, 7), np.linspace(-0.2, 1.2, 6)
+    sphere = metric.fit(cap, axes)
+    found = stretch(sphere)
+    u, alpha = (np.moveaxis(x, 0, -1) for x in (found.field.values, shapes(axes)))
+    squares = collections.defaultdict(list)
+    for start in np.ndindex(7, 6):
+        for step in ((1, 0), (0, 1), (1, 1), (1, -1)):
+            end = start[0] + step[0], start[1] + step[1]
+            if end[0] > 6 or not 0 <= end[1] <= 5:
+                continue
+            edge = alpha[end] - alpha[start]
+            along = alpha[start] + (np.arange(40)[:, None] + 0.5) / 40 * edge
+            length = sphere.norm(along, edge + 0 * along).mean()
+            square = (np.linalg.norm(u[end] - u[start]) / length - 1) ** 2
+            squares[start].append(square)
+            squares[end].append(square)
+    expected = [np.sqrt(np.mean(squares[place])) for place in np.ndindex(7, 6)]
+    assert found.distortion.ravel() == pytest.approx(expected, rel=2e-2)
+    edges = np.concatenate([*squares.values()])
+    assert (found.rms, found.largest) == pytest.approx(
+        (np.sqrt(edges.mean()), np.sqrt(edges.max())), rel=1e-2
+    )
+
+
+X, Y = shapes((np.arange(5.0), np.arange(4.0)))
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "share"),
+    [(X, Y, 0.0), (Y, X, 1.0), (np.minimum(X, 6.0 - X), Y, 0.25)],
+)
+def test_cells_that_are_turned_over_are_counted_by_triangles(x, y, share):
+    """Of a plane that is folded along the middle of its third column of four, the last
+    column is turned over."""
+    assert inverted_fraction(np.stack([x, y], -1)) == share

@@ -85,16 +85,16 @@ class Source:
             k += step
 
 
-def arrays(raw: bytes) -> dict[str, Any]:
+def arrays(raw: bytes, largest: int = LARGEST) -> dict[str, Any]:
     """Return variables by name: arrays of real numbers, lines of text, cells as arrays
     of such objects, structs as dicts by field, None for anything else. Refusal for a
-    damaged file."""
+    damaged file, or one that holds ``largest`` bytes or more, inflated."""
     orders = {b"\x00\x01IM": "<", b"\x01\x00MI": ">"}
     order = orders.get(raw[124:HEADER])
     if order is None:
         raise Refusal("no MATLAB file of version 5 to 7")
     variables = {}
-    bytes_left = LARGEST
+    bytes_left = largest
     source = Source(order)
     for kind, data in source.elements(memoryview(raw)[HEADER:]):
         if kind == COMPRESSED:

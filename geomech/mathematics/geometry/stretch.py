@@ -103,7 +103,7 @@ def stretch(metric: Metric | Finsler, points: int | None = None) -> Stretch:
         distortion=np.sqrt(square / n_edges).reshape(counts),
         rms=float(np.sqrt((error**2).mean())),
         largest=float(np.abs(error).max()),
-        folded=_inverted_fraction(u),
+        folded=inverted_fraction(u),
     )
 
 
@@ -213,7 +213,7 @@ def _aligned(u: np.ndarray, alpha: np.ndarray) -> np.ndarray:
     return (u - middle) @ (v @ w)
 
 
-def _inverted_fraction(u: np.ndarray) -> float:
+def inverted_fraction(u: np.ndarray) -> float:
     """Return the fraction of the cells' triangles that are turned over."""
     a = u[:-1, :-1]
     b = u[1:, :-1]

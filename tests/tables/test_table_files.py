@@ -1,0 +1,731 @@
+"""What files of tables hold, part by part, and what is wrong with bad ones."""
+
+import json
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+from scipy.io import savemat
+
+from geomech.io import tables
+from geomech.mathematics.systems import Table
+from rft.core.refusal import Refusal
+
+AXES = np.linspace(-1.0, 1.0, 5), np.array([-0.5, 0.0, 0.2, 0.9])
+GRID = ("alpha_1", "alpha_2")
+ENTRIES = ("Ax1", "Ax2", "Ay1", "Ay2", "Atheta1", "Atheta2")
+
+
+def assert_refused(path, said, **options):
+    with pytest.raises(Refusal) as refusal:
+        tables.load(path, **options)
+    message = str(refusal.value)
+    assert message.startswith(f"the table {path} {said}")
+    assert "\n" not in message
+
+
+# NetCDF.
+
+LEADS = {
+    "A": ("component", "joint"),
+    "fit_residual": ("component",),
+    "speed": ("component",),
+    "even_part": ("component",),
+    "harmonics": ("component", "coefficient"),
+    "harmonics_residual": ("component",),
+    "A_error": ("component", "joint"),
+    "norm": ("norm_coefficient",),
+    "norm_residual": (),
+    "ccf_pairs": ("pair", "component"),
+}
+SIZES = {"component": 3, "joint": 2, "coefficient": 4, "norm_coefficient": 5, "pair": 1}
+
+
+def netcdf(path, change=None):
+    """Write a table of 5 by 4 shapes with all that a file may have."""
+    rng = np.random.default_rng(0)
+    parts = {name: ((name,), axis) for name, axis in zip(GRID, AXES)}
+    parts["joint"] = ("joint",), np.arange(2)
+    parts["component"] = ("component",), ["x", "y", "theta"]
+    parts["pair_joints"] = ("pair", "pair_joint"), np.array([[1.0, 2.0]])
+    for name, lead in LEADS.items():
+        shape = [*(SIZES[dimension] for dimension in lead), 5, 4]
+        parts[name] = (*lead, *GRID), rng.uniform(0.1, 1.0, shape)
+    attributes = {
+        "length_unit": "m",
+        "body_length": 0.3,
+        "interpolation": 2,
+        "frame": "mean",
+        "level": 0.9,
+        "power_degree": 1.5,
+    }
+    if change:
+        change(parts, attributes)
+    data = xarray.Dataset(parts, attrs=attributes)
+    data.to_netcdf(path, engine="scipy", format="NETCDF3_64BIT")
+    return {name: values for name, (_, values, *_) in parts.items()}
+
+
+def attributes(**values):
+    return lambda parts, attributes: attributes.update(values)
+
+
+def part(name, dims, values, **about):
+    return lambda parts, attributes: parts.update({name: (dims, values, about)})
+
+
+def cut(name, index, dims=None):
+    """A part with some of its values, over other dimensions if they are given."""
+
+    def change(parts, attributes):
+        before, values = parts[name]
+        parts[name] = dims or before, values[index]
+
+    return change
+
+
+def put(name, index, value):
+    return lambda parts, attributes: parts[name][1].__setitem__(index, value)
+
+
+def less(*names):
+    def change(parts, attributes):
+        for name in names:
+            parts.pop(name, None)
+            attributes.pop(name, None)
+
+    return change
+
+
+def both(*changes):
+    def change(parts, attributes):
+        for one in changes:
+            one(parts, attributes)
+
+    return change
+
+
+def masked(*names, **said):
+    """The shape (1, 2) is singular in some parts."""
+    return both(*(put(name, (..., 1, 2), np.nan) for name in names), attributes(**said))
+
+
+SINGULAR = {"singular_shapes": "nan"}
+
+
+@pytest.mark.parametrize(
+    ("sign", "stated", "turn"),
+    [
+        ("", "", 1),
+        ("-", "", -1),
+        ("", "xi = - A alphadot", -1),
+        ("+", "xi = - A alphadot", 1),
+    ],
+)
+def test_every_part_of_a_netcdf_file_is_where_it_belongs(sign, stated, turn, tmp_path):
+    parts = netcdf(tmp_path / "a.nc", attributes(sign_of_A=stated))
+    held = tables.load(tmp_path / "a.nc", sign)
+    c = held.connection
+    found = {
+        "alpha_1": c.axes[0],
+        "alpha_2": c.axes[1],
+        "A": turn * c.A,
+        "fit_residual": c.residual,
+        "speed": c.speed,
+        "harmonics": turn * held.harmonics.coefficients,
+        "harmonics_residual": held.harmonics.residual,
+        "even_part": held.even,
+        "A_error": held.A_error,
+        "norm": held.metric.coefficients,
+        "norm_residual": held.metric.residual,
+    }
+    for name, values in found.items():
+        np.testing.assert_array_equal(values, parts[name], name)
+    assert c.size == {"unit": "m", "length": 0.3}
+    assert (c.degree, held.harmonics.degree, held.metric.degree) == (2, 2, 2)
+    assert (held.length, held.unit, held.sized) == (0.3, "m", True)
+    assert (held.frame, held.level, held.power_degree) == ("mean", 0.9, 1.5)
+    assert (held.sign, held.order, held.body) == ("+-"[turn < 0], "ndgrid", None)
+
+
+def test_what_a_netcdf_file_does_not_state_is_the_usual(tmp_path):
+    optional = ("speed", "harmonics_residual", "norm_residual", "component")
+    facts = ("length_unit", "body_length", "interpolation", "frame", "level")
+    parts = netcdf(tmp_path / "a.nc", less(*optional, *facts))
+    held = tables.load(tmp_path / "a.nc")
+    speed = np.sqrt((parts["A"] ** 2).mean(1) + parts["fit_residual"] ** 2)
+    np.testing.assert_allclose(held.connection.speed, speed, rtol=1e-12)
+    np.testing.assert_array_equal(held.harmonics.residual, parts["fit_residual"])
+    np.testing.assert_array_equal(held.metric.residual, np.zeros((5, 4)))
+    assert held.connection.size == {"unit": "length", "length": None}
+    assert (held.connection.degree, held.level) == (3, None)
+    assert (held.length, held.unit, held.sized) == (1.0, "BL", False)
+    assert held.frame == "that of the table"
+
+
+def test_parts_that_a_netcdf_file_lacks_are_none(tmp_path):
+    netcdf(tmp_path / "a.nc", less("harmonics", "even_part", "A_error", "power_degree"))
+    held = tables.load(tmp_path / "a.nc")
+    assert held.harmonics is held.even is held.A_error is None
+    assert held.metric is held.power_degree is None
+
+
+def test_a_quadratic_metric_is_taken_before_a_norm(tmp_path):
+    M = part("metric", ("joint", "other_joint", *GRID), np.ones((2, 2, 5, 4)))
+    netcdf(tmp_path / "a.nc", M)
+    held = tables.load(tmp_path / "a.nc")
+    np.testing.assert_array_equal(held.metric.M, np.ones((2, 2, 5, 4)))
+    assert held.power_degree == 1.5
+
+
+def test_singular_shapes_leave_no_harmonics_nor_even_part(tmp_path):
+    names = ("A", "fit_residual", "harmonics", "even_part", "A_error")
+    netcdf(tmp_path / "a.nc", masked(*names, **SINGULAR))
+    held = tables.load(tmp_path / "a.nc")
+    assert held.harmonics is held.even is None
+    assert np.argwhere(np.isnan(held.connection.A[0, 0])).tolist() == [[1, 2]]
+    assert np.isnan(held.A_error).sum() == 6
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (less("joint"), "holds no connection, joint is missing: write it anew"),
+        (less("fit_residual"), "holds no connection, fit_residual is missing"),
+        (part("joint", ("joint", "k"), np.zeros((2, 1))), "has A over (component, jo"),
+        (part("joint", ("k",), np.arange(3)), "holds no connection, alpha_3 is miss"),
+        (part("alpha_2", ("alpha_2",), AXES[1], units="rads"), "has alpha_2 in 'rads'"),
+        (part("alpha_1", ("alpha_1",), 20 * AXES[0][::-1]), "has no grid: alpha_1 mu"),
+        (part("alpha_1", ("alpha_1",), 57 * AXES[0]), "has alpha_1 up to 57 where an"),
+        (
+            both(less("A_error"), cut("A", np.s_[:, :1], ("component", "one", *GRID))),
+            "has A over (component, one, alpha_1, alpha_2) where it must be",
+        ),
+        (
+            both(
+                part("joint", ("k",), np.arange(2)),
+                less("A_error"),
+                cut("A", np.s_[:, :1]),
+            ),
+            "has A of shape (3, 1, 5, 4) where it must be (3, 2, ...), rows x, y, t",
+        ),
+        (
+            part("component", ("component",), ["theta", "y", "x"]),
+            "has A of shape (3, 2",
+        ),
+        (
+            part("A", ("component", "joint", *GRID), np.ones((3, 2, 5, 4), "i4")),
+            "has A of shape (3, 2, 5, 4) that does not fit its grid",
+        ),
+        (put("A", (0, 1, 2, 3), np.inf), "has A that is not finite (nan or inf) at in"),
+        (put("A", (0, 1, 2, 3), 2e9), "has A above 1e+09 at index (0, 1, 2, 3)"),
+        (attributes(length_unit="feet"), "has a body_length or length_unit that makes"),
+        (attributes(body_length=1e9), "has a body_length"),
+        (attributes(body_length=0), "has a body_length"),
+        (attributes(body_length=[0.3, 0.3]), "has a body_length"),
+        (attributes(body_length="1"), "has a body_length"),
+        (attributes(interpolation=4), "has too few shapes for a spline of degree 4: w"),
+        (cut("harmonics", np.s_[:, :3]), "has harmonics of shape (3, 3, 5, 4) where i"),
+        (put("harmonics", (1, 2, 3, 0), np.nan), "has harmonics that is not finite"),
+        (put("even_part", (1, 2, 3), np.nan), "has even_part that is not finite"),
+        (
+            cut("A_error", np.s_[:, :1], ("component", "one", *GRID)),
+            "has A_error over (component, one,",
+        ),
+        (put("A_error", (0, 1, 2, 3), -1e-9), "has A_error below 0 where it is half o"),
+        (cut("pair_joints", np.s_[:, ::-1]), "has pair_joints other than [[1, 2]]: wr"),
+        (
+            both(less("pair_joints"), cut("ccf_pairs", np.s_[[0, 0]])),
+            "has ccf_pairs of shape (2, 3, 5, 4) where it must be (1, 3, ...)",
+        ),
+        (put("ccf_pairs", (0, 2, 1, 1), np.nan), "has ccf_pairs that is not finite"),
+        (attributes(power_degree=100.0), "has a power_degree that makes no sense"),
+        (attributes(power_degree=0), "has a power_degree"),
+        (attributes(power_degree=[1.0, 2.0]), "has a power_degree"),
+        (
+            cut("norm", np.s_[:4]),
+            "has a norm of shape (4, 5, 4) where it must be (an odd number, ...) of",
+        ),
+        (
+            part(
+                "metric",
+                ("joint", "other_joint", *GRID),
+                np.reshape([[1, 0.5], [0.6, 1]], (2, 2, 1, 1)) * np.ones((5, 4)),
+            ),
+            "has a metric of shape (2, 2, 5, 4) where it must be (2, 2, ...) and symm",
+        ),
+        (
+            masked("A", "fit_residual", "speed", "A_error"),
+            "has A that is not finite (nan or inf) at index (0, 0, 1, 2)",
+        ),
+        (masked("A", "A_error", **SINGULAR), "has fit_residual at singular shapes, wh"),
+        (masked("A", "fit_residual", **SINGULAR), "has A_error at singular shapes"),
+        (masked("fit_residual", **SINGULAR), "has fit_residual that is not finite"),
+        (masked("A_error", **SINGULAR), "has A_error that is not finite"),
+    ],
+)
+def test_parts_of_a_netcdf_file_that_do_not_fit_are_refused(change, said, tmp_path):
+    netcdf(tmp_path / "a.nc", change)
+    assert_refused(tmp_path / "a.nc", said)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        part("alpha_2", ("alpha_2",), AXES[1], units="radians"),
+        part("alpha_1", ("alpha_1",), 31.4 * AXES[0]),
+        attributes(body_length=0.99e9),
+        attributes(interpolation=3),
+        attributes(interpolation=6),
+        attributes(interpolation=0),
+        cut("harmonics", np.s_[:, :2]),
+        put("A_error", ..., 0.0),
+        put("fit_residual", ..., np.nan),
+        attributes(power_degree=99),
+        attributes(power_degree=0.1),
+        cut("norm", np.s_[:3]),
+        masked("A", "fit_residual", "speed", "A_error", **SINGULAR),
+    ],
+)
+def test_parts_of_a_netcdf_file_within_their_bounds_are_read(change, tmp_path):
+    netcdf(tmp_path / "a.nc", change)
+    assert tables.load(tmp_path / "a.nc").connection.A.shape == (3, 2, 5, 4)
+
+
+@pytest.mark.parametrize(
+    ("level", "found"),
+    [(0.5, 0.5), (0, None), (1, None), (-0.5, None), ([0.5, 0.6], None), ("1", None)],
+)
+def test_a_level_that_makes_no_sense_is_left_out(level, found, tmp_path):
+    netcdf(tmp_path / "a.nc", attributes(level=level))
+    assert tables.load(tmp_path / "a.nc").level == found
+
+
+CHAIN = {"lengths": [1, 2, 1], "frame": "mean", "modes": [[1.0, 0.0]], "waves": 1.0}
+LINKS = {"lengths": [1, 2, 1], "frame": "link-1"}
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        (json.dumps(CHAIN), CHAIN),
+        (json.dumps(LINKS), LINKS),
+        (json.dumps({"lengths": [1]}), None),
+        (json.dumps({"frame": "mean"}), None),
+        (json.dumps({**CHAIN, "radius": 1}), None),
+        ("[1, 2]", None),
+        ("{", None),
+        ("[" * 100_000, None),
+    ],
+)
+def test_a_body_that_makes_no_sense_is_left_out(text, found, tmp_path):
+    netcdf(tmp_path / "a.nc", attributes(body=text))
+    assert tables.load(tmp_path / "a.nc").body == found
+
+
+# NetCDF of a measured gait: A about it, of two joints and with two harmonics.
+
+GAIT_SHAPES = {
+    "gait": (2, 3),
+    "gait_A": (3, 2, 5),
+    "gait_slope": (3, 2, 1, 5),
+    "gait_errors": (4, 3, 2, 2, 5),
+    "gait_off": (3, 2, 7),
+}
+GAIT = {"level": 0.9, "error_factor": 2.1}
+
+
+def gait_netcdf(path, changes, **facts):
+    rng = np.random.default_rng(0)
+    values = {name: rng.normal(size=shape) for name, shape in GAIT_SHAPES.items()}
+    values["gait_spread"] = np.eye(2)[..., None] * [1.0, 2.0, 3.0]
+    values["gait_beyond"] = np.array([-0.1, 0.2, 0.3])
+    values |= changes
+
+    def change(parts, attributes):
+        for name, array in values.items():
+            if array is not None:
+                dims = [f"{name}_{k}" for k in range(np.ndim(array))]
+                parts[name] = dims, array
+        attributes.update({**GAIT, **facts})
+
+    netcdf(path, change)
+    return values
+
+
+@pytest.mark.parametrize(("sign", "turn"), [("+", 1.0), ("-", -1.0)])
+def test_parts_of_a_gait_are_where_they_belong(sign, turn, tmp_path):
+    parts = gait_netcdf(tmp_path / "a.nc", {})
+    found = tables.load(tmp_path / "a.nc", sign).connection.taylor
+    for values, expected in (
+        (found.loop.coefficients, parts["gait"]),
+        (found.A, turn * parts["gait_A"]),
+        (found.slope, turn * parts["gait_slope"]),
+        (found.errors, turn * parts["gait_errors"]),
+        (found.spread, parts["gait_spread"]),
+        (found.beyond, [0.1, 0.2, 0.3]),
+        (found.standard_error, np.abs(parts["gait_off"])),
+    ):
+        np.testing.assert_array_equal(values, expected)
+    assert (found.level, found.factor) == (0.9, 2.1)
+
+
+@pytest.mark.parametrize(
+    ("changes", "facts"),
+    [
+        ({"gait_off": None}, {}),
+        ({"gait_errors": np.ones((1, 3, 2, 2, 5))}, {}),
+        ({"gait": np.ones((2, 5))}, {}),
+        ({}, {"level": 0.01, "error_factor": 0.99e6}),
+    ],
+)
+def test_parts_of_a_gait_within_their_bounds_are_read(changes, facts, tmp_path):
+    gait_netcdf(tmp_path / "a.nc", changes, **facts)
+    found = tables.load(tmp_path / "a.nc").connection.taylor
+    assert np.shape(found.standard_error)[:2] == (3, 2)
+
+
+UNFIT = (
+    "has a gait whose parts do not fit each other: write it anew with 'geomech fit-g"
+)
+ONE_JOINT = {
+    "gait": np.ones((1, 3)),
+    "gait_A": np.ones((3, 1, 5)),
+    "gait_slope": np.ones((3, 1, 0, 5)),
+    "gait_errors": np.ones((1, 3, 1, 1, 5)),
+    "gait_spread": np.ones((1, 1, 3)),
+}
+EVEN = {
+    "gait_A": np.ones((3, 2, 4)),
+    "gait_slope": np.ones((3, 2, 1, 4)),
+    "gait_errors": np.ones((1, 3, 2, 2, 4)),
+}
+
+
+@pytest.mark.parametrize(
+    ("changes", "facts", "said"),
+    [
+        (
+            {"gait_A": np.ones((3, 2))},
+            {},
+            "has a gait, but no gait_A that fits it: wri",
+        ),
+        ({"gait_spread": None}, {}, "has a gait, but no gait_spread"),
+        ({"gait": np.ones((2, 1))}, {}, "has a gait that does not move: write it anew"),
+        ({"gait": np.zeros((2, 3))}, {}, "has a gait that does not move"),
+        ({"gait": np.ones((2, 4))}, {}, UNFIT),
+        ({"gait_A": np.ones((2, 2, 5))}, {}, UNFIT),
+        ({"gait_A": np.ones((3, 3, 5))}, {}, UNFIT),
+        ({"gait_A": np.ones((3, 2, 7))}, {}, UNFIT),
+        ({"gait_slope": np.ones((3, 2, 2, 5))}, {}, UNFIT),
+        ({"gait_errors": np.ones((4, 2, 2, 2, 5))}, {}, UNFIT),
+        ({"gait_spread": np.ones((2, 1, 3))}, {}, UNFIT),
+        ({"gait_spread": np.ones((2, 2, 3))}, {}, UNFIT),
+        ({"gait_spread": np.eye(3)[..., None]}, {}, UNFIT),
+        ({"gait_beyond": np.ones(2)}, {}, UNFIT),
+        ({"gait_off": np.ones((3, 2))}, {}, UNFIT),
+        ({"gait_off": np.ones((3, 1, 7))}, {}, UNFIT),
+        ({"gait_off": np.ones((2, 2, 7))}, {}, UNFIT),
+        (EVEN, {}, UNFIT),
+        ({}, {"level": 0.0}, UNFIT),
+        ({}, {"level": 1.0}, UNFIT),
+        ({}, {"level": "1"}, UNFIT),
+        ({}, {"error_factor": 0.0}, UNFIT),
+        ({}, {"error_factor": 1e6}, UNFIT),
+        ({}, {"error_factor": [2.0, 3.0]}, UNFIT),
+    ],
+)
+def test_parts_of_a_gait_that_do_not_fit_are_refused(changes, facts, said, tmp_path):
+    gait_netcdf(tmp_path / "a.nc", changes, **facts)
+    assert_refused(tmp_path / "a.nc", said)
+
+
+# MATLAB.
+
+PLAIN = np.arange(20.0).reshape(5, 4)
+ROWS = {
+    "alpha1": np.linspace(0, 1, 5)[:, None],
+    "alpha2": np.linspace(0, 1, 4)[None],
+}
+FULL = {
+    "unit": "m",
+    "length": 0.3,
+    "interpolation": 2,
+    "frame": "mean",
+    "level": 0.9,
+    "power_degree": 1.5,
+    "sign": "-",
+    "shapes": ["a", "b"],
+}
+
+
+def matlab(path, changes=None, about=None):
+    """Write a table of 5 by 4 shapes as of ndgrid; return its arrays."""
+    first, second = np.meshgrid(*AXES, indexing="ij")
+    arrays = {"alpha1": first, "alpha2": second}
+    for k, name in enumerate(ENTRIES, 1):
+        arrays[name] = k + 0.1 * PLAIN
+    arrays |= {"M11": 2 + PLAIN, "M12": np.full((5, 4), 0.5), "M22": 1 + PLAIN}
+    arrays["geomech_fit_residual"] = np.stack([PLAIN, PLAIN + 1, PLAIN + 2])
+    arrays["geomech_A_error"] = np.full((3, 2, 5, 4), 0.1)
+    if about is not None:
+        arrays["geomech_about"] = json.dumps(about)
+    arrays |= changes or {}
+    savemat(path, {name: x for name, x in arrays.items() if x is not None})
+    return arrays
+
+
+@pytest.mark.parametrize(("sign", "turn"), [("", -1), ("-", -1), ("+", 1)])
+def test_every_part_of_a_matlab_file_is_where_it_belongs(sign, turn, tmp_path):
+    arrays = matlab(tmp_path / "a.mat", about=FULL)
+    held = tables.load(tmp_path / "a.mat", sign)
+    c = held.connection
+    A = np.reshape([arrays[name] for name in ENTRIES], (3, 2, 5, 4))
+    residual = arrays["geomech_fit_residual"]
+    M = [[arrays["M11"], arrays["M12"]], [arrays["M12"], arrays["M22"]]]
+    np.testing.assert_array_equal(turn * c.A, A)
+    np.testing.assert_array_equal(c.residual, residual)
+    np.testing.assert_allclose(c.speed, np.sqrt((A**2).mean(1) + residual**2))
+    np.testing.assert_array_equal(held.metric.M, M)
+    np.testing.assert_array_equal(held.A_error, arrays["geomech_A_error"])
+    assert c.size == {"unit": "m", "length": 0.3}
+    assert (c.degree, held.metric.degree) == (2, 2)
+    assert (held.length, held.unit, held.sized) == (0.3, "m", True)
+    assert (held.frame, held.level, held.power_degree) == ("mean", 0.9, 1.5)
+    assert (held.sign, held.order) == ("+-"[turn < 0], "ndgrid")
+    assert (held.shapes, held.assumptions, held.body) == (("a", "b"), (), None)
+
+
+def test_what_a_matlab_file_does_not_state_is_the_usual(tmp_path):
+    lacking = ("M12", "geomech_fit_residual", "geomech_A_error")
+    matlab(tmp_path / "a.mat", dict.fromkeys(lacking))
+    held = tables.load(tmp_path / "a.mat", "+")
+    c = held.connection
+    assert held.metric is held.A_error is held.power_degree is held.level is None
+    assert np.isnan(c.residual).all()
+    np.testing.assert_allclose(c.speed, np.sqrt((c.A**2).mean(1)), rtol=1e-12)
+    assert (held.unit, held.length, held.sized) == ("BL", 1.0, False)
+    assert (c.degree, held.frame) == (3, "that of the table")
+    assert held.shapes == ("alpha_1", "alpha_2")
+
+
+@pytest.mark.parametrize(
+    ("about", "sized", "degree", "power"),
+    [
+        (
+            {"unit": "m", "length": 0.99e9, "interpolation": 1, "power_degree": 99.0},
+            True,
+            1,
+            99.0,
+        ),
+        (
+            {"unit": "m", "length": 1e9, "interpolation": 4, "power_degree": 100.0},
+            False,
+            3,
+            None,
+        ),
+        (
+            {"unit": "BL", "length": 1.0, "interpolation": 0, "power_degree": 0.0},
+            True,
+            3,
+            None,
+        ),
+        ({"unit": "m", "length": 0.0, "power_degree": 2}, False, 3, None),
+        ({"unit": "m", "length": 2, "frame": 3, "level": "most"}, False, 3, None),
+        ({"unit": "mm", "length": 2.0}, False, 3, None),
+        ([1, 2], False, 3, None),
+    ],
+)
+def test_what_a_matlab_file_states_is_taken_where_it_makes_sense(
+    about, sized, degree, power, tmp_path
+):
+    matlab(tmp_path / "a.mat", about=about)
+    held = tables.load(tmp_path / "a.mat", "+")
+    size = (about["unit"], about["length"]) if sized else ("BL", 1.0)
+    assert (held.sized, held.unit, held.length) == (sized, *size)
+    assert (held.connection.degree, held.power_degree) == (degree, power)
+    assert (held.frame, held.level) == ("that of the table", None)
+
+
+@pytest.mark.parametrize(
+    "names", [["", "a"], ["x" * 61, "a"], ["a\x1b", "b"], ["$x$", "b"], [3, "b"], ["a"]]
+)
+def test_names_of_joints_that_make_no_sense_are_not_taken(names, tmp_path):
+    for stated, found in (
+        (names, ("alpha_1", "alpha_2")),
+        (["a", "a"], ("alpha_1", "alpha_2")),
+        (["a", "x" * 60], ("a", "x" * 60)),
+    ):
+        matlab(tmp_path / "a.mat", about={"shapes": stated})
+        assert tables.load(tmp_path / "a.mat", "+").shapes == found
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        (
+            ROWS,
+            "has alpha1 and alpha2 as rows, which leave the order open: say order =",
+        ),
+        (
+            {"Ay2": PLAIN[:, :3]},
+            "has Ay2 of shape (5, 3) where alpha1 and alpha2 make ",
+        ),
+        ({"Ax1": np.full((5, 4), np.nan)}, "has Ax1 that is not finite"),
+        ({"Ax1": np.full((5, 4), 1j)}, "has Ax1 that is no array of real numbers"),
+        ({"Ax1": "text"}, "has Ax1 that is no array of real numbers"),
+        ({"Ax1": {"a": 1}}, "has Ax1 that is no array of real numbers"),
+        (dict.fromkeys(ENTRIES, 0 * PLAIN), "has a connection that is zero everywhere"),
+        (
+            {"alpha1": PLAIN[:, :3]},
+            "has alpha1 (5, 3) and alpha2 (5, 4), which span no",
+        ),
+        (
+            {"alpha1": np.ones((3, 3, 3))},
+            "has alpha1 (3, 3, 3) and alpha2 (5, 4), whic",
+        ),
+        (
+            {"alpha1": np.ones((5, 4))},
+            "has no grid: alpha1 must be at least 4 ascending",
+        ),
+        (
+            {"alpha1": PLAIN},
+            "has alpha1 and alpha2 that span no grid: one must change ",
+        ),
+        (
+            {"alpha1": AXES[0][:, None] + 2e-9 * np.arange(4)},
+            "has alpha1 and alpha2 that span no grid",
+        ),
+        (
+            {"alpha1": 6.4 * AXES[0][:, None] + 0 * PLAIN},
+            "has alpha1 up to 6.4 where angles are in rad: convert it if these are deg",
+        ),
+        (
+            {"M11": 0.25 / (1 + PLAIN)},
+            "has M11, M12 and M22 that are no metric at index",
+        ),
+        (
+            {"M11": -1 - PLAIN, "M22": -1 - PLAIN},
+            "has M11, M12 and M22 that are no met",
+        ),
+        (
+            {"M22": 0 * PLAIN},
+            "has M11, M12 and M22 that are no metric at index (0, 0): ",
+        ),
+        (
+            {"M12": PLAIN[:4]},
+            "has M12 of shape (4, 4) where alpha1 and alpha2 make it ",
+        ),
+        (
+            {"geomech_A_error": np.ones((3, 2, 4, 5))},
+            "has geomech_A_error of shape (3, 2, 4, 5) where A has (3, 2, 5, 4)",
+        ),
+        ({"geomech_A_error": -np.ones((3, 2, 5, 4))}, "has geomech_A_error below 0"),
+        (
+            {"geomech_A_error": np.full((3, 2, 5, 4), np.nan)},
+            "has geomech_A_error that ",
+        ),
+        (
+            {"geomech_fit_residual": np.full((3, 5, 4), np.inf)},
+            "has geomech_fit_residual that is not finite",
+        ),
+    ],
+)
+def test_parts_of_a_matlab_file_that_do_not_fit_are_refused(changes, said, tmp_path):
+    matlab(tmp_path / "a.mat", changes)
+    assert_refused(tmp_path / "a.mat", said, sign="+")
+
+
+@pytest.mark.parametrize(
+    ("changes", "order", "said"),
+    [
+        ({}, "meshgrid", "has arrays that run as ndgrid's: drop order"),
+        (
+            ROWS,
+            "meshgrid",
+            "has Ax1 of shape (5, 4) where alpha1 and alpha2 make it (4",
+        ),
+    ],
+)
+def test_another_order_than_that_of_the_arrays_is_refused(
+    changes, order, said, tmp_path
+):
+    matlab(tmp_path / "a.mat", changes)
+    assert_refused(tmp_path / "a.mat", said, sign="+", order=order)
+
+
+@pytest.mark.parametrize(
+    ("changes", "about", "order"),
+    [
+        ({}, None, "ndgrid"),
+        (ROWS, None, "ndgrid"),
+        ({"M11": 0.26 / (1 + PLAIN)}, None, ""),
+        ({"M11": None, "M12": PLAIN[:4]}, None, ""),
+        ({"geomech_A_error": "none"}, None, ""),
+        ({"geomech_fit_residual": np.zeros((3, 4, 5))}, None, ""),
+        ({"alpha1": 6.2 * AXES[0][:, None] + 0 * PLAIN}, None, ""),
+        ({"alpha1": 6.4 * AXES[0][:, None] + 0 * PLAIN}, {}, ""),
+        ({"alpha1": AXES[0][:, None] + 2e-10 * np.arange(4)}, None, ""),
+    ],
+)
+def test_parts_of_a_matlab_file_within_their_bounds_are_read(
+    changes, about, order, tmp_path
+):
+    matlab(tmp_path / "a.mat", changes, about)
+    A = tables.load(tmp_path / "a.mat", "+", order).connection.A
+    np.testing.assert_array_equal(A[2, 1], 6 + 0.1 * PLAIN)
+
+
+@pytest.mark.parametrize("options", [{"do_compression": True}, {"format": "4"}])
+def test_a_matlab_file_may_be_compressed_or_of_version_4(options, tmp_path):
+    arrays = matlab(tmp_path / "a.mat")
+    flat = {name: x for name, x in arrays.items() if np.ndim(x) == 2}
+    savemat(tmp_path / "b.mat", flat, **options)
+    A = tables.load(tmp_path / "b.mat", "+").connection.A
+    np.testing.assert_array_equal(A, tables.load(tmp_path / "a.mat", "+").connection.A)
+
+
+# Damage.
+
+
+DATA = Path(__file__).parents[1] / "data"
+SAVED = [DATA / "uneven.nc", DATA / "frozen" / "field.mat"]
+
+
+@pytest.mark.parametrize("path", SAVED, ids=lambda path: path.name)
+def test_files_that_are_cut_short_are_refused(path, tmp_path):
+    raw = path.read_bytes()
+    for size in (0, 3, 10, 127, 130, 500, 2000, len(raw) // 2, len(raw) - 9):
+        (tmp_path / path.name).write_bytes(raw[:size])
+        assert_refused(tmp_path / path.name, "")
+
+
+@pytest.mark.parametrize("path", SAVED, ids=lambda path: path.name)
+def test_damaged_files_are_refused_or_read_as_finite_tables(path, tmp_path):
+    """With up to five bytes changed, 150 times."""
+    raw = path.read_bytes()
+    rng = np.random.default_rng(1)
+    for _ in range(150):
+        damaged = bytearray(raw)
+        for k in rng.integers(0, 4000, rng.integers(1, 6)):
+            damaged[k % len(raw)] = rng.integers(256)
+        (tmp_path / path.name).write_bytes(damaged)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            try:
+                held = tables.load(tmp_path / path.name)
+            except Refusal as refusal:
+                said = str(refusal)
+                assert said.startswith(f"the table {tmp_path / path.name} ")
+                assert "\n" not in said
+                continue
+        assert np.isfinite(held.connection.A).all()
+
+
+def test_a_field_with_gaps_is_no_system(tmp_path):
+    names = ("A", "fit_residual", "speed", "A_error")
+    netcdf(tmp_path / "a.nc", both(masked(*names, **SINGULAR), less("ccf_pairs")))
+    with pytest.raises(Refusal, match="has singular shapes .nan., and nothing is"):
+        Table(tmp_path / "a.nc")
