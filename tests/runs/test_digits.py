@@ -1,4 +1,5 @@
-"""Large requests have the same digits wherever they were stopped, whoever computes them."""
+"""Large requests have the same digits wherever they were stopped, whoever computes
+them."""
 
 import dataclasses
 

@@ -1,4 +1,5 @@
-"""Files on disk: whole or not at all, and nothing left behind, whatever happens to their writer."""
+"""Files on disk: whole or not at all, and nothing left behind, whatever happens to
+their writer."""
 
 import contextlib
 import os
@@ -43,7 +44,8 @@ def start(writer, target, how, **options):
 
 
 def write(writer, target, text="new", error=None):
-    """Write a file, or a file in a folder, and return its path; an error comes midway."""
+    """Write a file, or a file in a folder, and return its path; an error comes
+    midway."""
     name = "a.txt" if writer == "atomic_folder" else ""
     with getattr(files, writer)(target) as path:
         (path / name).write_text(text)
@@ -184,7 +186,8 @@ LISTENERS = []
 
 @pytest.fixture(scope="module")
 def audited():
-    """Events of the file system are told to `LISTENERS`; Python's hooks stay for good."""
+    """Events of the file system are told to `LISTENERS`; Python's hooks stay for
+    good."""
 
     def tell(event, args):
         if LISTENERS and event.partition(".")[0] in ("os", "open", "shutil"):

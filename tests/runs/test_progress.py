@@ -1,5 +1,5 @@
-"""How far a computation is: lines in a pipe, a bar in a notebook, from commands and from
-Python."""
+"""How far a computation is: lines in a pipe, a bar in a notebook, from commands and
+from Python."""
 
 import sys
 import time

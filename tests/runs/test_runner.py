@@ -1,4 +1,5 @@
-"""Results of tasks are found by what they follow from; what is stopped loses nothing."""
+"""Results of tasks are found by what they follow from; what is stopped loses
+nothing."""
 
 import contextlib
 import re
@@ -30,7 +31,8 @@ VISCOUS = scenes.load("three-link-viscous")
 
 @contextlib.contextmanager
 def counted(stop=None):
-    """Yield the list of results that are stored; a signal comes after ``stop`` of them."""
+    """Yield the list of results that are stored; a signal comes after ``stop`` of
+    them."""
     computed = []
     put = Store.put
 
@@ -167,7 +169,13 @@ def test_long_marches_are_stored_every_two_seconds(tmp_path, monkeypatch):
 
 # Commands
 
-MARCH = "[[effects]]\nkind = 'body-inertia'\nmass = 0.1\nfrequency = 0.5\nlength = 0.3\ndrag = 2.1\n"
+MARCH = """[[effects]]
+kind = "body-inertia"
+mass = 0.1
+frequency = 0.5
+length = 0.3
+drag = 2.1
+"""
 COARSE_WALK = "\n[numerics]\nsteps = 8\nelements = 4\nduration = 1.0\n"
 SMALL = {
     "march.toml": f"{VISCOUS.text}[numerics]\nphases = 16\ncycles = 1\n{MARCH}",

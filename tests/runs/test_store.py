@@ -1,5 +1,5 @@
-"""What is stored is read back to the last bit or not at all, whatever became of the file;
-and nobody fails for its sake."""
+"""What is stored is read back to the last bit or not at all, whatever became of the
+file; and nobody fails for its sake."""
 
 import errno
 import os

@@ -1,9 +1,8 @@
-"""Long requests under kills, interrupts, rivals and a full disk: the digits of a quiet run,
-and no orphans.
+"""Long requests under kills, interrupts, rivals and a full disk: the digits of a quiet
+run, and no orphans.
 
-The short form takes some seconds; the long one is asked for by hand:
-pytest -m soak tests/runs/test_torture.py
-"""
+The short form takes some seconds; the long one is asked for by hand: pytest -m soak
+tests/runs/test_torture.py"""
 
 import os
 import random
@@ -112,7 +111,8 @@ def ended(process, number):
 
 
 def check_words(err, number, partial):
-    """Check what a command says that is stopped: nothing, if it had not begun to hear."""
+    """Check what a command says that is stopped: nothing, if it had not begun to
+    hear."""
     if not err or number == signal.SIGKILL:
         return
     assert err.splitlines()[-1].startswith(f"error: stopped by {number.name}: "), err

@@ -1,4 +1,5 @@
-"""Work shared by processes: nothing is lost when a worker is ended, and nobody waits for ever."""
+"""Work shared by processes: nothing is lost when a worker is ended, and nobody waits
+for ever."""
 
 import contextlib
 import itertools

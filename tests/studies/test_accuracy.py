@@ -1,4 +1,5 @@
-"""The accuracy study: declared orders where theory gives them, and what it chooses and draws."""
+"""The accuracy study: declared orders where theory gives them, and what it chooses and
+draws."""
 
 import numpy as np
 import pytest

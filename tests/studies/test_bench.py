@@ -1,4 +1,5 @@
-"""A study alone remembers; a scene is a small value; its TOML is true, however it was made."""
+"""A study alone remembers; a scene is a small value; its TOML is true, however it was
+made."""
 
 import pickle
 

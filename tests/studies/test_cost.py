@@ -36,12 +36,14 @@ LARGE_SCENES = {
     "elements.toml": SANDFISH.replace("elements = 100", "elements = 2000"),
 }
 HARMONICS = "displacement harmonics.toml --amplitudes 1 --tiers harmonic"
+MANY = "--over gait.amplitude=0.1:2:99999"
+AROUND = "displacement five.toml --tiers path"
 LARGE = {
     "values of a sweep": "sweep sandfish-transient --over medium.C=1:2:99999 -o out.nc",
-    "amplitudes of a sweep": "sweep sandfish-loose --over gait.amplitude=0.1:2:99999 -o out.nc",
+    "amplitudes of a sweep": f"sweep sandfish-loose {MANY} -o out.nc",
     "a grid": "connection three-link-glass --grid 1414 -o out.nc",
     "a field of four joints": "connection finest.toml --grid 36 -o out.nc",
-    "a connection around a gait": "displacement five.toml --amplitudes 0.1:0.5:99999 --tiers path",
+    "a connection around a gait": f"{AROUND} --amplitudes 0.1:0.5:99999",
     "a map": "ccf directions.toml --grid 301 --plot out.png",
     "directions": "connection directions.toml -o out.nc --grid 301",
     "harmonics": f"{HARMONICS} --grid 201",

@@ -1,5 +1,5 @@
-"""Counted beforehand: the force balances of every tier, table, error, motion and sweep are those
-that are solved."""
+"""Counted beforehand: the force balances of every tier, table, error, motion and sweep
+are those that are solved."""
 
 import dataclasses
 import tracemalloc

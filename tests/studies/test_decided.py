@@ -1,4 +1,5 @@
-"""When a request is too long: assumed seconds, and those that its first balances tell."""
+"""When a request is too long: assumed seconds, and those that its first balances
+tell."""
 
 import numpy as np
 import pytest

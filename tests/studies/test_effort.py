@@ -1,4 +1,5 @@
-"""What moving costs: metric and norm, path length, work and cost of transport of gaits."""
+"""What moving costs: metric and norm, path length, work and cost of transport of
+gaits."""
 
 import numpy as np
 import pytest

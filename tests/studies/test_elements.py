@@ -24,7 +24,8 @@ CIRCLE = Circle(5.0, centre=(1.0, 0.5))
 
 
 def arcs(count, **options):
-    """Return two arcs as a function of shape, of ``count`` links whose poses it returns."""
+    """Return two arcs as a function of shape, of ``count`` links whose poses it
+    returns."""
     s = (np.arange(count) + 0.5) / count
 
     def positions(alpha):

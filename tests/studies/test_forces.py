@@ -1,5 +1,5 @@
-"""Forces along a body: they balance, do the work of the joints, are those of a closed form,
-and have units."""
+"""Forces along a body: they balance, do the work of the joints, are those of a closed
+form, and have units."""
 
 import dataclasses
 
@@ -44,7 +44,8 @@ TURNING = Wave(0.6, 1.0, offset=0.3, joints=4)
 
 
 def midline(folder):
-    """Return a bend that runs to the tail, measured as curvature at 21 places of 16 frames."""
+    """Return a bend that runs to the tail, measured as curvature at 21 places of 16
+    frames."""
     t, s = np.meshgrid(np.arange(16) / 16, np.linspace(0, 1, 21), indexing="ij")
     curvature = 5 * (1 - s / 2) * np.cos(2 * np.pi * (s + t))
     table = np.stack([t, s, curvature], -1).reshape(-1, 3)
@@ -101,8 +102,8 @@ def test_thrust_and_drag_balance_and_forces_do_the_work_of_the_joints(name, tmp_
 
 
 def places(scene, s):
-    """Return points s of the drawn body in the world, complex (N, n), the headings there, and
-    its head (N,)."""
+    """Return points s of the drawn body in the world, complex (N, n), the headings
+    there, and its head (N,)."""
     alpha, _ = scene.gait.cycle(scene.numerics.phases)
     pose = poses(scene.cycle().xi)[:-1]
     ends = scene.system.body.points(alpha, pose) @ [1, 1j] / body_size(scene.system)
@@ -114,7 +115,8 @@ def places(scene, s):
 
 @pytest.mark.parametrize("name", ["links", "serpenoid", "turning"])
 def test_forces_laid_out_in_the_plane_hold_the_moments(name, tmp_path):
-    """Net force and moment vanish, and the moment at a point is that of the forces behind it."""
+    """Net force and moment vanish, and the moment at a point is that of the forces
+    behind it."""
     scene = SCENES[name](tmp_path).with_numerics(phases=24)
     v, run = values(scene)
     place, heading, head = places(scene, v["s"])
@@ -138,9 +140,9 @@ def test_forces_laid_out_in_the_plane_hold_the_moments(name, tmp_path):
 
 
 def test_a_small_sine_in_a_fluid_has_the_forces_of_its_closed_form():
-    """y = A sin(k x + t) in drag 1 along and r across: forwards r k A^2 cos^2 by normal forces,
-    of mean r k A^2 / 2, as much backwards by tangential ones, and power r A^2 cos^2; far from
-    the ends, to the square of the slope."""
+    """y = A sin(k x + t) in drag 1 along and r across: forwards r k A^2 cos^2 by normal
+    forces, of mean r k A^2 / 2, as much backwards by tangential ones, and power r A^2
+    cos^2; far from the ends, to the square of the slope."""
     r = 3.0
     waves = 8.0
     slope = 0.02
@@ -228,7 +230,8 @@ def test_the_cost_counts_all_that_errors_take(name, balances):
 
 
 def test_newtons_and_watts_follow_from_sizes():
-    """Stress x 2 r L; the catalogue's stress grows with depth; a heavy body says its own."""
+    """Stress x 2 r L; the catalogue's stress grows with depth; a heavy body says its
+    own."""
     fish = FISH.with_numerics(phases=16)
     plain, of_plain = forces(fish)
     assert of_plain.unit.missing == ("length", "radius", "depth")
@@ -262,8 +265,8 @@ def small_steps():
 
 
 def finer(scene):
-    """Return three times the elements, a hundredth of the regularisation and, of steps in time,
-    four times as many."""
+    """Return three times the elements, a hundredth of the regularisation and, of steps
+    in time, four times as many."""
     n_phases = scene.numerics.phases * (4 if scene.system.traits.steps else 1)
     scene = scene.with_numerics(regularisation=1e-8, phases=n_phases)
     finer_parts = {}
@@ -290,7 +293,8 @@ ALONG = ("forward", "tangential", "power", "bending_moment")
     ids=lambda scene: scene.name,
 )
 def test_errors_cover_what_finer_numerics_change(scene):
-    """At nine points of ten, and in the mean 20 times as large at most, along the body 30."""
+    """At nine points of ten, and in the mean 20 times as large at most, along the body
+    30."""
     found = answer(scene, Sizes())
     truth, _ = forces(finer(scene))
     step = truth["phase"].values.size // scene.numerics.phases

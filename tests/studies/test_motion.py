@@ -1,5 +1,5 @@
-"""Bodies in the world, trajectories, films and strips, against kinematics drawn link by link
-and the direct tier."""
+"""Bodies in the world, trajectories, films and strips, against kinematics drawn link by
+link and the direct tier."""
 
 import contextlib
 import dataclasses
@@ -41,8 +41,8 @@ SAND = Granular(1.8, 0.24)
 
 
 def drawn(lengths, bends, length, frame, pose):
-    """Return the ends of links (n + 1, 2), laid one after the other from the tail and moved
-    so that the frame is at the pose."""
+    """Return the ends of links (n + 1, 2), laid one after the other from the tail and
+    moved so that the frame is at the pose."""
     parts = length * np.array(lengths) / sum(lengths)
     headings = np.concatenate([[0.0], np.cumsum(bends)])
     steps = parts[:, None] * np.stack([np.cos(headings), np.sin(headings)], -1)
@@ -140,8 +140,8 @@ def test_a_cycle_ends_where_the_direct_tier_says(name):
     np.testing.assert_array_equal(one.pose[0], 0.0)
     np.testing.assert_allclose(one.pose[-1], net, atol=1e-13)
     np.testing.assert_allclose(two.pose[:n], one.pose[:n], atol=1e-13)
-    # The end of a cycle is foreseen, with an error of order 2 in 1/phases; where another
-    # follows it is solved for.
+    # The end of a cycle is foreseen, with an error of order 2 in 1/phases; where
+    # another cycle follows it is solved for.
     tolerance = 1e-13 if name in REPEATING else 5e-3
     np.testing.assert_allclose(two.pose[n], net, atol=tolerance)
     phase = np.linspace(0, 4 * np.pi, 2 * n + 1)
@@ -171,7 +171,8 @@ def test_where_cycles_differ_each_goes_on_from_the_one_before(name):
 
 @pytest.mark.parametrize("frame", ["mean", "link-1", "link-3"])
 def test_wheels_do_not_slip_in_the_world(frame):
-    """Centres of links move along their links, by differences of order 8 of their ends."""
+    """Centres of links move along their links, by differences of order 8 of their
+    ends."""
     snake = NoSlipSnake((0.8, 1.3, 1.0), 0.4, frame)
     motion = compute_motion(Scene(snake, ZIGZAG, Numerics(phases=256)), 2)
     ends = motion.points()

@@ -1,4 +1,5 @@
-"""Sweeps over a scene's parameters: right at every point, in as few batches as may be."""
+"""Sweeps over a scene's parameters: right at every point, in as few batches as may
+be."""
 
 import numpy as np
 import pytest
@@ -119,8 +120,8 @@ def test_bodies_with_end_caps_of_several_sizes_do_not(batches):
 
 
 def test_a_level_ground_is_no_gentle_slope():
-    """Without a slope cycles become periodic, with one there is one cycle: they do not share
-    a batch."""
+    """Without a slope cycles become periodic, with one there is one cycle: they do not
+    share a batch."""
     travel = '"transient"\ntravel = 0.03'
     coarse = {"phases": 32, "pieces": 12}
     fish = with_effects(travel, '"depth-profile"\nslope = 0.0').with_numerics(**coarse)
@@ -202,8 +203,8 @@ OVER = {
 
 
 def test_rows_find_their_points_whatever_varies_fastest_or_changes_nothing():
-    """The amplitude is the innermost, wherever it is given, and a frequency that changes no row
-    is computed once."""
+    """The amplitude is the innermost, wherever it is given, and a frequency that
+    changes no row is computed once."""
     one = grid.Grid(None, OVER, {}, "gait.amplitude", ("gait.frequency",))
     assert one.names == ["gait.frequency", "body.length", "gait.amplitude"]
     assert one.total == 12

@@ -1,4 +1,5 @@
-"""What an uncertain medium does to a displacement, against many media drawn from its covariance."""
+"""What an uncertain medium does to a displacement, against many media drawn from its
+covariance."""
 
 import dataclasses
 
@@ -57,7 +58,8 @@ def drawn(scene, draws, amplitudes, phases=16):
 
 
 def whitened(count, size, seed):
-    """Return normal draws (2 count, size) in opposite pairs, with exactly unit covariance."""
+    """Return normal draws (2 count, size) in opposite pairs, with exactly unit
+    covariance."""
     z = np.random.default_rng(seed).normal(size=(count, size))
     z -= z.mean(0)
     covariance = np.cov(z.T, bias=True).reshape(size, size)
@@ -97,8 +99,8 @@ def test_in_a_frame_that_depends_on_the_medium_media_have_their_own():
 
 
 def test_a_wide_covariance_is_carried_on_to_second_order():
-    """Where drag is almost the same in all directions, the turn of a viscous swimmer is far
-    from linear in its ratio."""
+    """Where drag is almost the same in all directions, the turn of a viscous swimmer is
+    far from linear in its ratio."""
     wide = scene(Viscous(1.15, ((0.3**2,),)))
     told = medium_spread(wide, GAIT, np.array([0.7]))
     near = scene(Viscous(1.15, ((0.03**2,),)))
