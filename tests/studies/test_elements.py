@@ -17,6 +17,7 @@ from geomech.studies.scene_tables import SceneTables
 from rft.bodies import Backbone, ConstantCurvature, Positions, Serpenoid
 from rft.effects import Transient
 
+pytestmark = pytest.mark.usefixtures("fastest")
 FLUID = rft.Viscous(2.0)
 GLASS = MEDIA["glass-0.3mm-loose"]
 FINE = 240

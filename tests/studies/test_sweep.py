@@ -123,7 +123,7 @@ def test_a_level_ground_is_no_gentle_slope():
     """Without a slope cycles become periodic, with one there is one cycle: they do not
     share a batch."""
     travel = '"transient"\ntravel = 0.03'
-    coarse = {"phases": 32, "pieces": 12}
+    coarse = {"phases": 16, "pieces": 6}
     fish = with_effects(travel, '"depth-profile"\nslope = 0.0').with_numerics(**coarse)
     found = swept(fish, {"effects.depth-profile.slope": [0.0, 0.05]})["displacement"]
     level = net(with_effects(travel).with_numerics(**coarse))
@@ -145,7 +145,7 @@ BOTH = with_effects(
 
 
 def test_one_frequency_is_that_of_all_effects():
-    both = BOTH.with_numerics(phases=32)
+    both = BOTH.with_numerics(phases=16)
     found = swept(both, {"effects.frequency": [0.0, 3.0, 9.0]})
     assert found["frequency"].tolist() == [0.0, 3.0, 9.0]
     poses = found["displacement"]
