@@ -222,3 +222,16 @@ def test_a_metric_of_the_systems_own_has_lengths_and_no_work(name):
     looked_up = metric.path_length(tables.metric.norm, own.gait, [0.8])
     assert looked_up == pytest.approx([length], rel=1e-4)
     assert effort.units(own.system)["path_length"] == effort.METRIC_UNIT
+
+
+PAST = scene(Swimmer(SAND, UNEVEN, (Transient(travel_m=0.03),)))
+
+
+@pytest.mark.parametrize(
+    ("one", "phases", "expected"),
+    [(IN_FLUID, 9, 12), (IN_FLUID, 12, 12), (PAST, 8, 32), (PAST, 33, 36)],
+)
+def test_phases_of_a_cost_are_fours_and_of_steps_no_fewer_than_32(
+    one, phases, expected
+):
+    assert effort.effort_phases(one, phases) == expected
