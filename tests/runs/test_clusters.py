@@ -1,104 +1,81 @@
-"""Sweeps on a Dask cluster on the loopback interface."""
+"""Large requests on a Dask cluster on the loopback interface."""
 
 import os
 import socket
 import subprocess
 import sys
-import tempfile
 
-import numpy as np
 import pytest
 from commands import geomech
-from tabled import swept_table
 from tasks import always_dies, dies, fails
-from test_workers import OVER, power  # noqa: F401  power is a fixture
+from test_digits import REQUESTS
+from test_store import same
 
-from geomech import scenes
 from geomech.run import executors
 from geomech.run.executors import Cluster
 from geomech.run.runner import runner
 from geomech.run.workers import using
-from geomech.studies.displacement import cycles, sweep
+from geomech.studies.displacement import cycles
 from rft.core.refusal import Refusal
 
 distributed = pytest.importorskip(
     "distributed", reason="the extra 'distributed' is not installed"
 )
-
-
-GLASS = scenes.load("three-link-glass").with_numerics(phases=32)
 pytestmark = pytest.mark.filterwarnings(
     "ignore::ResourceWarning", "ignore::DeprecationWarning"
 )  # of Dask's own
+SWEEP = ["sweep", "three-link-viscous", "--over", "gait.amplitude=0.5,1", "-o"]
+
+
+def cluster(n_workers=0):
+    return distributed.LocalCluster(
+        protocol="tcp://",
+        silence_logs=50,
+        processes=False,
+        n_workers=n_workers,
+        threads_per_worker=1,
+        dashboard_address=":0",
+    )
 
 
 @pytest.fixture(scope="module")
 def address():
-    """Of a cluster of two threads of this process."""
-    settings = {
-        "processes": False,
-        "n_workers": 2,
-        "threads_per_worker": 1,
-        "dashboard_address": ":0",
-    }
-    with distributed.LocalCluster(
-        protocol="tcp://", silence_logs=50, **settings
-    ) as local:
+    """The address of a cluster of two threads of this process."""
+    with cluster(2) as local:
         yield local.scheduler_address
 
 
-def test_the_cluster_gives_the_same_digits(address, power, monkeypatch):  # noqa: F811
+def test_a_cluster_gives_the_digits_of_one_process(address, monkeypatch):
     monkeypatch.setattr(cycles, "BATCH_SIZE", 4)
-    for scene, over in (
-        (GLASS, OVER),
-        (GLASS.changed(medium=power(1.0)), {"medium.power": [0.9, 1.0]}),
-    ):
-        alone, told = swept_table(sweep.sweep(scene, over)), []
-        with using(scheduler=address):
-            shared = swept_table(sweep.sweep(scene, over, progress=told.append))
-        for key in ("displacement", "estimate", "estimate_heading"):
-            np.testing.assert_array_equal(shared[key], alone[key])
-        assert told == sorted(told) and told[-1] == 1.0
+    alone = REQUESTS["sweep"]()
+    with using(scheduler=address):
+        assert same(REQUESTS["sweep"](), alone)
 
 
-def test_errors_of_parts_are_those_of_the_command(address):
+def test_the_command_computes_on_a_cluster(address, tmp_path):
+    for name, option in (("a.nc", "--workers=1"), ("b.nc", f"--scheduler={address}")):
+        assert geomech(*SWEEP, name, option, cwd=tmp_path)[::2] == (0, "")
+    assert (tmp_path / "a.nc").read_bytes() == (tmp_path / "b.nc").read_bytes()
+
+
+def test_errors_of_tasks_are_those_of_the_command(address):
     with using(scheduler=address), pytest.raises(Refusal, match="no such thing as 2"):
         list(runner().map(fails, None, range(4), 4))
-    with (
-        using(scheduler=address),
-        pytest.raises(Refusal, match="a cluster cannot know what is to be computed"),
-    ):
+    unknown = pytest.raises(Refusal, match="a cluster cannot know what is to be")
+    with using(scheduler=address), unknown:
         list(runner().map(lambda c, x: x, None, range(4), 4))
 
 
 @pytest.fixture
-def processes():
+def processes(tmp_path_factory):
     """A scheduler, and two workers that are processes."""
-    settings = {
-        "processes": False,
-        "n_workers": 0,
-        "dashboard_address": ":0",
-        "protocol": "tcp://",
-    }
     options = ["--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory"]
-    with (
-        distributed.LocalCluster(silence_logs=50, **settings) as local,
-        tempfile.TemporaryDirectory() as folder,
-    ):
-        command = [
-            sys.executable,
-            "-m",
-            "dask",
-            "worker",
-            local.scheduler_address,
-            *options,
-            folder,
-        ]
-        env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-        both = [
-            subprocess.Popen(command, env=env, stderr=subprocess.DEVNULL)
-            for _ in range(2)
-        ]
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    with cluster() as local:
+        line = [sys.executable, "-m", "dask", "worker", local.scheduler_address]
+        line += [*options, tmp_path_factory.mktemp("dask")]
+        pipes = {"env": env, "stderr": subprocess.DEVNULL}
+        both = [subprocess.Popen(line, **pipes) for _ in range(2)]
         try:
             yield local, both
         finally:
@@ -108,81 +85,53 @@ def processes():
 
 
 def test_a_worker_that_is_ended_loses_nothing(processes, tmp_path, monkeypatch):
-    """By its own id, with SIGKILL; then the other one, by a part that ends whoever does it."""
+    """One by SIGKILL; then the other, by a task that ends whoever computes it."""
     local, both = processes
     monkeypatch.setattr(executors, "WAIT", 30.0)
     monkeypatch.setattr(executors, "COUNT_INTERVAL", 0.2)
     with using(scheduler=local.scheduler_address):
-        monkeypatch.setattr(
-            executors, "WAIT", 3.0
-        )  # to close the connection; its workers have come
+        monkeypatch.setattr(executors, "WAIT", 3.0)  # its workers have come
         assert list(runner().map(dies, str(tmp_path), range(8), 8)) == [*range(8)]
-        assert (tmp_path / "died").exists()
         assert sorted(process.poll() is None for process in both) == [False, True]
         local.scheduler.allowed_failures = 0
-        with pytest.raises(
-            RuntimeError, match="workers were ended again and again at the same part"
-        ):
+        often = "workers were ended again and again at the same part"
+        with pytest.raises(RuntimeError, match=often):
             list(runner().map(always_dies, None, [0], 1))
 
 
 def test_a_worker_with_other_code_is_refused(address, monkeypatch):
-    monkeypatch.setattr(
-        executors, "VERSION", "geomech 9.9, solver 9"
-    )  # of this command; threads share it, parts bear it
-    monkeypatch.setattr(
-        executors, "_version_and_back_end", lambda: ("geomech 9.8, solver 9", "numpy")
-    )
-    with pytest.raises(
-        Refusal,
-        match="has geomech 9.8, solver 9, this command geomech 9.9, solver 9: install the same",
-    ):
+    """Threads share the version; the function that they run tells another."""
+    own = "geomech 9.9, solver 9"
+    other = "geomech 9.8, solver 9"
+    monkeypatch.setattr(executors, "VERSION", own)
+    monkeypatch.setattr(executors, "_version_and_back_end", lambda: (other, "numpy"))
+    refused = f"has {other}, this command {own}: install the same"
+    with pytest.raises(Refusal, match=refused):
         Cluster(address)
 
 
-def listening():
-    """A port of this machine at which nobody listens."""
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return one.getsockname()[1]
-
-
 @pytest.mark.parametrize(
-    "word",
+    ("word", "said"),
     [
-        "tcp://127.0.0.1:{port}",
-        "127.0.0.1:{port}",
-        "nonsense",
-        "http://127.0.0.1:{port}",
-        "",
+        ("tcp://127.0.0.1:{port}", "nothing answers there"),
+        ("127.0.0.1:{port}", "nothing answers there"),
+        ("nonsense", "missing port"),
+        ("http://127.0.0.1:{port}", "unknown address"),
+        ("tcp://127.0.0.1:1;x", "invalid literal"),
+        ("", "missing port"),
     ],
 )
-def test_a_scheduler_that_is_none_is_one_line(word, tmp_path, monkeypatch):
+def test_a_scheduler_that_is_none_is_one_line(word, said, tmp_path, monkeypatch):
     monkeypatch.setattr(executors, "WAIT", 0.1)
-    word = word.format(port=listening())
-    args = [
-        "three-link-viscous",
-        "--over",
-        "gait.amplitude=0.5,1",
-        "-o",
-        "s.nc",
-        "--scheduler",
-        word,
-    ]
-    code, out, err = geomech("sweep", *args, cwd=tmp_path)
-    assert (code, out) == (2, "") and err.count("\n") == 1
-    assert err.startswith(f"error: --scheduler {word}: ") and "'dask scheduler'" in err
+    with socket.socket() as one:  # at whose port nobody listens
+        one.bind(("127.0.0.1", 0))
+        word = word.format(port=one.getsockname()[1])
+    code, out, err = geomech(*SWEEP, "s.nc", "--scheduler", word, cwd=tmp_path)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith(f"error: --scheduler {word}: ")
+    assert said in err
+    assert "'dask scheduler'" in err
     assert list(tmp_path.iterdir()) == []
-
-
-def test_no_client_is_made_of_what_is_no_address(monkeypatch):
-    """One whose connection fails so prints a traceback, seconds later."""
-    monkeypatch.setattr(distributed, "Client", None)
-    for word in ("nonsense", "http://127.0.0.1:80", "tcp://127.0.0.1:1;x", ""):
-        with pytest.raises(
-            Refusal, match="missing port|unknown address|invalid literal"
-        ):
-            Cluster(word)
 
 
 def test_a_scheduler_that_never_answers_is_one_line(monkeypatch):
@@ -196,14 +145,8 @@ def test_a_scheduler_that_never_answers_is_one_line(monkeypatch):
 
 def test_a_cluster_without_workers_is_one_line(monkeypatch):
     monkeypatch.setattr(executors, "WAIT", 0.3)
-    settings = {
-        "processes": False,
-        "n_workers": 0,
-        "dashboard_address": ":0",
-        "protocol": "tcp://",
-    }
     none = pytest.raises(Refusal, match="it has no workers: start some")
-    with distributed.LocalCluster(silence_logs=50, **settings) as local, none:
+    with cluster() as local, none:
         Cluster(local.scheduler_address)
 
 
@@ -214,18 +157,5 @@ def test_without_the_package_the_cure_is_named(monkeypatch):
 
 
 def test_workers_and_a_scheduler_are_one_too_many():
-    with (
-        pytest.raises(Refusal, match="give one of the two"),
-        using(2, "tcp://127.0.0.1:1"),
-    ):
-        pass
-
-
-def test_the_command_computes_on_a_cluster(address, tmp_path):
-    args = ["three-link-viscous", "--over", "gait.amplitude=0.5,1"]
-    for name, more in (
-        ("a.nc", ["--workers", "1"]),
-        ("b.nc", ["--scheduler", address]),
-    ):
-        assert geomech("sweep", *args, "-o", name, *more, cwd=tmp_path)[::2] == (0, "")
-    assert (tmp_path / "a.nc").read_bytes() == (tmp_path / "b.nc").read_bytes()
+    with pytest.raises(Refusal, match="give one of the two"):
+        using(2, "tcp://127.0.0.1:1").__enter__()

@@ -1,4 +1,5 @@
-"""Files on disk: whole or not at all, and nothing left behind, whatever happens to their writer."""
+"""Files on disk: whole or not at all, and nothing left behind, whatever happens to
+their writer."""
 
 import contextlib
 import os
@@ -12,52 +13,67 @@ import pytest
 from geomech.io import files
 from rft.core.refusal import Refusal
 
+WRITERS = ["atomic_file", "atomic_folder"]
 KILLED = """
-import os, signal, sys
-from pathlib import Path
+import os, resource, signal, sys
 from geomech.io import files
-with getattr(files, sys.argv[1])(sys.argv[2]) as path:
-    (path / "a.txt" if sys.argv[1] == "atomic_folder" else path).write_text("half")
-    if sys.argv[3] == "wait":
+writer, target, how = sys.argv[1:]
+with getattr(files, writer)(target) as path:
+    (path / "a.txt" if writer == "atomic_folder" else path).write_text("half")
+    if how == "wait":
         print("ready", flush=True)
         sys.stdin.read()
-    os.kill(os.getpid(), getattr(signal, sys.argv[3]))
+    os.kill(os.getpid(), getattr(signal, how))
 """
-WRITERS = ["atomic_file", "atomic_folder"]
+LIMITED = """
+import resource, sys
+from geomech.io import files
+writer, target = sys.argv[1:]
+resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+try:
+    with getattr(files, writer)(target) as path:
+        (path / "a.txt" if writer == "atomic_folder" else path).write_text("x" * 5000)
+except files.Refusal as error:
+    print(error)
+"""
 
 
 def start(writer, target, how, **options):
-    return subprocess.Popen(
-        [sys.executable, "-c", KILLED, writer, str(target), how], **options
-    )
+    line = [sys.executable, "-c", KILLED, writer, target, how]
+    return subprocess.Popen(line, **options)
 
 
-def write(writer, target, text="new"):
+def write(writer, target, text="new", error=None):
+    """Write a file, or a file in a folder, and return its path; an error comes
+    midway."""
+    name = "a.txt" if writer == "atomic_folder" else ""
     with getattr(files, writer)(target) as path:
-        (path / "a.txt" if writer == "atomic_folder" else path).write_text(text)
-    return target / "a.txt" if writer == "atomic_folder" else target
+        (path / name).write_text(text)
+        if error is not None:
+            raise error
+    return target / name
+
+
+def paths(folder):
+    return sorted(folder.rglob("*"))
 
 
 @pytest.mark.parametrize("writer", WRITERS)
-def test_strays_of_a_kill_are_swept_by_the_next_writer(writer, tmp_path):
-    for _ in range(2):
-        assert start(writer, tmp_path / "out", "SIGKILL").wait() == -signal.SIGKILL
-    assert [p.name.startswith(".geomech-") for p in tmp_path.iterdir()] == [
-        True
-    ]  # the second swept the first's
-    assert start(writer, tmp_path / "another", "SIGKILL").wait() == -signal.SIGKILL
+def test_the_next_writer_removes_what_a_kill_left(writer, tmp_path):
+    for name, n_left in (("out", 1), ("out", 1), ("another", 2)):
+        process = start(writer, tmp_path / name, "SIGKILL")
+        assert process.wait() == -signal.SIGKILL
+        assert len(list(tmp_path.glob(".geomech-*"))) == n_left
     assert write(writer, tmp_path / "out").read_text() == "new"
-    assert (
-        len(list(tmp_path.iterdir())) == 2
-    )  # that of another target stays for its own
+    assert len(list(tmp_path.glob(".geomech-*"))) == 1  # of the other target
 
 
-def test_a_stray_beside_a_folder_that_now_is_there(tmp_path):
+def test_what_a_kill_left_of_a_folder_that_exists_now(tmp_path):
     start("atomic_folder", tmp_path / "out", "SIGKILL").wait()
     (tmp_path / "out").mkdir()
     start("atomic_folder", tmp_path / "out", "SIGKILL").wait()
     write("atomic_folder", tmp_path / "out")
-    assert [p.name for p in tmp_path.rglob("*")] == ["out", "a.txt"]
+    assert [p.name for p in paths(tmp_path)] == ["out", "a.txt"]
 
 
 @pytest.mark.parametrize("writer", WRITERS)
@@ -70,44 +86,50 @@ def test_a_living_writer_keeps_its_folder(writer, tmp_path):
         living.kill()
 
 
-def test_what_is_not_ours_stays(tmp_path):
-    """Names like ours, with a mark of something else, none, or behind a link; and an empty one that is not yet old."""
-    prefix, target = files._prefix(tmp_path / "out"), tmp_path / "out"
-    for name, words in (("other", b"mine"), ("empty", b""), ("none", None)):
-        (tmp_path / (prefix + name)).mkdir()
-        (tmp_path / (prefix + name) / "data").write_text("precious")
-        if words is not None:
-            (tmp_path / (prefix + name) / files.MARK).write_bytes(words)
-    (tmp_path / "elsewhere").mkdir()
-    (tmp_path / "elsewhere" / files.MARK).write_bytes(files._mark_text(target))
-    (tmp_path / (prefix + "link")).symlink_to(tmp_path / "elsewhere")
-    (tmp_path / (prefix + "file")).write_text("precious")
-    (tmp_path / (prefix + "young")).mkdir()
-    before = sorted(tmp_path.rglob("*"))
-    files.sweep_strays(target)
-    assert sorted(tmp_path.rglob("*")) == before
+@pytest.fixture
+def left(tmp_path):
+    """The name of a folder that a killed writer of "out" left."""
+    start("atomic_file", tmp_path / "out", "SIGKILL").wait()
+    (folder,) = tmp_path.glob(".geomech-*")
+    return folder
+
+
+def test_what_is_not_ours_stays(left, tmp_path):
+    """Names like ours, with a mark of something else, none, or behind a link."""
+    real = left.rename(tmp_path / "elsewhere")
+    stem = left.name[:-3]
+    (tmp_path / f"{stem}link").symlink_to(real)
+    (tmp_path / f"{stem}file").write_text("precious")
+    for name, mark in (("other", b"mine"), ("empty", b""), ("none", None)):
+        (tmp_path / f"{stem}{name}").mkdir()
+        (tmp_path / f"{stem}{name}" / "data").write_text("precious")
+        if mark is not None:
+            (tmp_path / f"{stem}{name}" / files.MARK).write_bytes(mark)
+    before = paths(tmp_path)
+    write("atomic_file", tmp_path / "out")
+    assert paths(tmp_path) == sorted([*before, tmp_path / "out"])
+
+
+def test_an_empty_folder_is_removed_once_it_is_old(left, tmp_path):
+    young = tmp_path / f"{left.name[:-3]}young"
+    young.mkdir()
+    write("atomic_file", tmp_path / "out")
+    assert young.exists()
     old = time.time() - 2 * files.ABANDONED
-    os.utime(tmp_path / (prefix + "young"), (old, old))
-    files.sweep_strays(target)
-    assert sorted(tmp_path.rglob("*")) == [
-        p for p in before if not p.name.endswith("young")
-    ]
+    os.utime(young, (old, old))
+    write("atomic_file", tmp_path / "out")
+    assert paths(tmp_path) == [tmp_path / "out"]
 
 
 @pytest.mark.parametrize("writer", WRITERS)
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt, SystemExit])
 def test_a_failure_leaves_what_was_there(writer, error, tmp_path):
     file = write(writer, tmp_path / "out", "old")
-
-    def fail():
-        with getattr(files, writer)(tmp_path / "out") as path:
-            (path / "a.txt" if writer == "atomic_folder" else path).write_text("half")
-            raise error
-
+    before = paths(tmp_path)
     with pytest.raises(error):
-        fail()
+        write(writer, tmp_path / "out", "half", error)
     assert file.read_text() == "old"
-    assert sorted(tmp_path.rglob("*")) == sorted({tmp_path / "out", file})
+    assert paths(tmp_path) == before
 
 
 @pytest.mark.parametrize(
@@ -119,12 +141,10 @@ def test_any_name_that_the_file_system_takes(writer, name, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == [name]
 
 
-def test_modes_are_the_usual_ones(tmp_path):
+def test_a_file_has_the_usual_mode(tmp_path):
     (tmp_path / "plain").write_text("")
-    assert (
-        write("atomic_file", tmp_path / "out").stat().st_mode
-        == (tmp_path / "plain").stat().st_mode
-    )
+    mode = write("atomic_file", tmp_path / "out").stat().st_mode
+    assert mode == (tmp_path / "plain").stat().st_mode
 
 
 def test_a_link_is_written_through(tmp_path):
@@ -137,124 +157,106 @@ def test_a_link_is_written_through(tmp_path):
 
 @pytest.mark.parametrize("writer", WRITERS)
 def test_a_folder_goes_where_few_files_can_be_open(writer, tmp_path, monkeypatch):
-    monkeypatch.setattr(
-        files.shutil, "rmtree", lambda *_, **__: None
-    )  # as it ends where none can be opened
-    with (
-        contextlib.suppress(KeyError),
-        getattr(files, writer)(tmp_path / "out") as path,
-    ):
-        (path / "b.txt" if writer == "atomic_folder" else path).write_text("half")
-        raise KeyError
-    assert not any(tmp_path.iterdir())
+    """Where no folder can be opened, `rmtree` ends without a word."""
+    monkeypatch.setattr(files.shutil, "rmtree", lambda *_, **__: None)
+    with pytest.raises(KeyError):
+        write(writer, tmp_path / "out", "half", KeyError)
+    assert paths(tmp_path) == []
 
 
-@pytest.mark.parametrize("kind", ["folder", "fifo"])
-def test_a_folder_replaces_files_alone(kind, tmp_path):
+@pytest.mark.parametrize("make", [os.mkdir, os.mkfifo])
+def test_a_folder_replaces_files_alone(make, tmp_path):
     (tmp_path / "out").mkdir()
-    if kind == "fifo":
-        os.mkfifo(tmp_path / "out" / "a.txt")
-    else:
-        (tmp_path / "out" / "a.txt").mkdir()
+    make(tmp_path / "out" / "a.txt")
     with pytest.raises(Refusal, match=r"a\.txt: it is no ordinary file"):
         write("atomic_folder", tmp_path / "out")
 
 
 def test_a_folder_does_not_replace_an_input(tmp_path):
-    file, source = write("atomic_folder", tmp_path / "out", "input"), tmp_path / "input"
-    source.hardlink_to(file)
-    with (
-        pytest.raises(Refusal, match="it is an input"),
-        files.atomic_folder(tmp_path / "out", [source]) as new,
-    ):
+    file = write("atomic_folder", tmp_path / "out", "input")
+    (tmp_path / "input").hardlink_to(file)
+    folder = files.atomic_folder(tmp_path / "out", [tmp_path / "input"])
+    with pytest.raises(Refusal, match="it is an input"), folder as new:
         (new / "a.txt").write_text("new")
     assert file.read_text() == "input"
 
 
+LISTENERS = []
+
+
 @pytest.fixture(scope="module")
-def heard():
-    """A list of functions that are told of every event of the file system; a hook of Python's cannot be taken out."""
-    listeners = []
+def audited():
+    """Events of the file system are told to `LISTENERS`; Python's hooks stay for
+    good."""
 
     def tell(event, args):
-        if listeners and event.partition(".")[0] in ("os", "open", "shutil"):
-            listeners[0](event, str(args))
+        if LISTENERS and event.partition(".")[0] in ("os", "open", "shutil"):
+            LISTENERS[0](str(args))
 
     sys.addaudithook(tell)
-    return listeners
 
 
 @pytest.mark.parametrize("writer", WRITERS)
-def test_a_stop_at_any_moment_leaves_nothing(writer, heard, tmp_path):
-    """An interrupt at the n-th event of the file system: in the making, the writing and the tidying up."""
-    for call in range(1, 40):
-        seen, folder = [], tmp_path / str(call)
-        folder.mkdir()
+@pytest.mark.parametrize("call", range(1, 40))
+def test_a_stop_at_any_moment_leaves_nothing(writer, call, audited, tmp_path):
+    """At the n-th event of the file system: in making, writing and tidying up."""
+    remaining = [call]
 
-        def stop(event, args):
-            if str(folder) in args:
-                seen.append(event)
-                if len(seen) == call:
-                    heard.clear()
-                    raise KeyboardInterrupt
+    def stop(args):
+        remaining[0] -= str(tmp_path) in args
+        if remaining[0] == 0:
+            LISTENERS.clear()
+            raise KeyboardInterrupt
 
-        heard.append(stop)
-        with contextlib.suppress(KeyboardInterrupt):
-            write(writer, folder / "out")
-        heard.clear()
-        assert not [p for p in folder.rglob("*") if p.name.startswith(".geomech-")], (
-            seen
-        )
-
-
-LIMITED = """
-import resource, sys
-from geomech.io import files
-resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
-try:
-    with getattr(files, sys.argv[1])(sys.argv[2]) as path:
-        (path / "a.txt" if sys.argv[1] == "atomic_folder" else path).write_text("x" * 5000)
-except files.Refusal as error:
-    print(error)
-"""
+    LISTENERS.append(stop)
+    with contextlib.suppress(KeyboardInterrupt):
+        write(writer, tmp_path / "out")
+    LISTENERS.clear()
+    assert list(tmp_path.rglob(".geomech-*")) == []
 
 
 @pytest.mark.parametrize("writer", WRITERS)
 def test_a_full_disk_is_named_and_leaves_what_was_there(writer, tmp_path):
     file = write(writer, tmp_path / "out", "old")
-    said = subprocess.run(
-        [sys.executable, "-c", LIMITED, writer, str(tmp_path / "out")],
-        capture_output=True,
-        text=True,
-    )
-    assert said.stdout.startswith("cannot write ")
-    assert f"{tmp_path / 'out'}: File too large; make room" in said.stdout
+    before = paths(tmp_path)
+    line = [sys.executable, "-c", LIMITED, writer, tmp_path / "out"]
+    said = subprocess.run(line, capture_output=True, text=True).stdout
+    assert said.startswith("cannot write ")
+    assert f"{tmp_path / 'out'}: File too large; make room" in said
     assert file.read_text() == "old"
-    assert sorted(tmp_path.rglob("*")) == sorted({tmp_path / "out", file})
+    assert paths(tmp_path) == before
 
 
-@pytest.mark.parametrize("bad", ["missing/out", "file/out", "out\0", "loop"])
-def test_where_nothing_can_be_written(bad, tmp_path):
+@pytest.mark.parametrize("writer", WRITERS)
+@pytest.mark.parametrize("name", ["file/out", "out\0", "loop"])
+def test_where_nothing_can_be_written(writer, name, tmp_path):
     (tmp_path / "file").write_text("")
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     with pytest.raises(Refusal, match="cannot write"):
-        write("atomic_file", tmp_path / bad)
-    if bad != "missing/out":
-        with pytest.raises(Refusal, match="cannot write the folder"):
-            write("atomic_folder", tmp_path / bad)
+        write(writer, tmp_path / name)
 
 
-def test_reading_stops_at_the_limit(tmp_path):
+def test_a_file_in_no_folder_cannot_be_written(tmp_path):
+    with pytest.raises(Refusal, match="cannot write"):
+        write("atomic_file", tmp_path / "missing" / "out")
+
+
+def test_text_is_read_without_its_mark_and_with_one_kind_of_lines(tmp_path):
     (tmp_path / "a").write_bytes(b"\xef\xbb\xbfa\r\nb\r")
     assert files.read_text(tmp_path / "a", 8) == "a\nb\n"
-    with pytest.raises(OSError, match="larger than"):
-        files.read(tmp_path / "a", 7)
-    for path in ("/dev/zero", tmp_path):
-        with pytest.raises(OSError, match="no ordinary file"):
-            files.read(path, 10)
-    if os.path.exists("/proc/self/status"):  # says that it is empty, and is not
-        with pytest.raises(OSError, match="larger than"):
-            files.read("/proc/self/status", 10)
-    with contextlib.suppress(FileNotFoundError):
-        files.read(tmp_path / "none", 10)
-        pytest.fail("read what is not there")
+
+
+@pytest.mark.parametrize(
+    ("name", "error"),
+    [
+        ("a", "larger than"),
+        ("/proc/self/status", "larger than"),  # says that it is empty
+        ("/dev/zero", "no ordinary file"),
+        ("", "no ordinary file"),
+        ("none", "No such file"),
+    ],
+)
+def test_reading_stops_at_the_limit_and_at_what_is_no_file(name, error, tmp_path):
+    (tmp_path / "a").write_text("7 bytes")
+    with pytest.raises(OSError, match=error):
+        files.read(tmp_path / name, 6)

@@ -1,9 +1,9 @@
-"""Long requests under kills, interrupts, flipped bits, rivals and a full disk: the digits of a quiet run, and no orphans.
+"""Long requests under kills, interrupts, rivals and a full disk: the digits of a quiet
+run, and no orphans.
 
-The short form takes some seconds; the long one is asked for by hand: pytest -m soak tests/runs/test_torture.py
-"""
+The short form takes some seconds; the long one is asked for by hand: pytest -m soak
+tests/runs/test_torture.py"""
 
-import contextlib
 import os
 import random
 import re
@@ -24,7 +24,9 @@ pytestmark = pytest.mark.skipif(
     not Path("/proc").is_dir(), reason="sees by /proc what is left of a process"
 )
 COMMAND = """
-import sys
+import signal, sys
+for number in (signal.SIGINT, signal.SIGTERM):
+    signal.signal(number, signal.SIG_DFL)
 from geomech import connection
 from geomech.shell import cli
 from geomech.run import pending, store
@@ -36,193 +38,166 @@ connection.SAMPLES_TOGETHER, cycles.BATCH_SIZE = 400, 8
 print("begun", flush=True)
 cli.main()
 """
-SANDFISH = (
-    scenes.load("sandfish-transient")
-    .text.replace("= 100", "= 5")
-    .replace("phases = 64", "phases = 32")
-)
-REQUESTS = {  # with the name of the output
-    "sweep": (
-        [
-            "sweep",
-            "glass.toml",
-            "--over",
-            "medium.C=1:3:4",
-            "--over",
-            "gait.amplitude=0.3:1.2:40",
-        ],
-        "out.nc",
-    ),
-    "field": (["connection", "glass.toml", "--grid", "31"], "out.nc"),
-    "march": (["trajectory", "sandfish.toml", "--cycles", "2"], "out.csv"),
+SANDFISH = scenes.load("sandfish-transient").text
+SANDFISH = SANDFISH.replace("= 100", "= 5").replace("phases = 64", "phases = 32")
+GLASS = scenes.load("three-link-glass").text + "[numerics]\nphases = 32\n"
+SCENES = {"sandfish.toml": SANDFISH, "glass.toml": GLASS}
+GRID = "--over medium.C=1:3:4 --over gait.amplitude=0.3:1.2:40"
+REQUESTS = {
+    "sweep": f"sweep glass.toml {GRID} -o out.nc",
+    "field": "connection glass.toml --grid 31 -o out.nc",
+    "march": "trajectory sandfish.toml --cycles 2 -o out.csv",
 }
-
-
-def scenes_in(folder):
-    (folder / "sandfish.toml").write_text(SANDFISH)
-    (folder / "glass.toml").write_text(
-        scenes.load("three-link-glass").text + "[numerics]\nphases = 32\n"
-    )
-    return folder
+SIGNALS = [signal.SIGINT, signal.SIGKILL, signal.SIGTERM, signal.SIGKILL]
 
 
 @pytest.fixture
 def place(tmp_path):
-    return scenes_in(tmp_path)
+    for name, text in SCENES.items():
+        (tmp_path / name).write_text(text)
+    return tmp_path
 
 
-def begun(args, out, cwd, workers, **options):
-    """The command as a process, in a session of its own."""
-    more = [] if args[0] == "trajectory" else ["--workers", str(workers)]
-    command = [sys.executable, "-c", COMMAND, *args, *more, "-o", out]
-    plain = lambda: [
-        signal.signal(n, signal.SIG_DFL) for n in (signal.SIGINT, signal.SIGTERM)
-    ]
+def begun(request, cwd, workers=1, **options):
+    """Return the command as a process, in a session of its own, once it has begun."""
+    line = REQUESTS[request].split()
+    if line[0] != "trajectory":
+        line += ["--workers", str(workers)]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    before = options.pop("preexec_fn", None)
-    prepare = lambda: (plain(), before and before())
-    return subprocess.Popen(
-        command, cwd=cwd, start_new_session=True, preexec_fn=prepare, **pipes, **options
+    process = subprocess.Popen(
+        [sys.executable, "-c", COMMAND, *line],
+        cwd=cwd,
+        start_new_session=True,
+        **pipes,
+        **options,
     )
+    assert process.stdout.readline() == "begun\n"
+    return process
 
 
-def session(process):
-    """Ids of all that is left of a process: it was the first of a session, and began no other."""
-    found = []
-    for place in Path("/proc").glob("[0-9]*"):
-        with contextlib.suppress(OSError, ValueError):
-            state, _, _, leader = (
-                place.joinpath("stat").read_text().rpartition(")")[2].split()[:4]
-            )
-            if (
-                int(leader) == process.pid
-                and state != "Z"
-                and int(place.name) != process.pid
-            ):
-                found.append(int(place.name))
-    return found
+def output(process, place):
+    """Return what a command wrote that nobody disturbs any more; it is removed."""
+    _, err = process.communicate(timeout=100)
+    assert process.returncode == 0, err
+    (path,) = place.glob("out.*")
+    content = path.read_bytes()
+    path.unlink()
+    return content
 
 
-def ended(process, number, patience=1.0):
-    """What a process says that is sent a signal; it ends soon, and none of its workers outlives it."""
-    began = time.monotonic()
+def orphans(process):
+    """Return all others that run in the session of a process."""
+    listed = subprocess.run(
+        ["ps", "-o", "pid=,stat=", "-s", str(process.pid)],
+        capture_output=True,
+        text=True,
+    )
+    rows = [line.split() for line in listed.stdout.splitlines()]
+    return [pid for pid, state in rows if state[0] != "Z" and int(pid) != process.pid]
+
+
+def ended(process, number):
+    """Return what a process says that is sent a signal; no worker outlives it."""
     if number == signal.SIGINT:  # as Ctrl-C does, to all of them
         os.killpg(process.pid, number)
     else:
         process.send_signal(number)
     _, err = process.communicate(timeout=20)
-    took = time.monotonic() - began
-    while session(process) and time.monotonic() < began + 20 * patience:
+    end = time.monotonic() + 20
+    while orphans(process) and time.monotonic() < end:
         time.sleep(0.02)
-    assert session(process) == []
-    if number != signal.SIGKILL:
-        assert took < 2 * patience, took
+    assert orphans(process) == []
     return err
 
 
-def tortured(name, place, whole, kills, seed, early=False):
-    """Every bout of a request ends badly, with one worker or two; the last one has the digits of a quiet one. early: each as
-    soon as it has kept something, else at any moment."""
-    (args, out), rng, seen = REQUESTS[name], random.Random(seed), set()
-    partial = place / f".{out}.partial"
-    size = lambda: partial.stat().st_size if partial.exists() else 0
-    numbers = [signal.SIGINT, signal.SIGKILL, signal.SIGTERM, signal.SIGKILL]
+def check_words(err, number, partial):
+    """Check what a command says that is stopped: nothing, if it had not begun to
+    hear."""
+    if not err or number == signal.SIGKILL:
+        return
+    assert err.splitlines()[-1].startswith(f"error: stopped by {number.name}: "), err
+    kept = re.search(r"\d+ results so far are kept in (.*): the same command", err)
+    assert kept is None or (kept[1] == partial.name and partial.exists())
+
+
+def size(path):
+    return path.stat().st_size if path.exists() else 0
+
+
+def flip_a_bit(path, rng):
+    raw = bytearray(path.read_bytes())
+    raw[rng.randrange(len(raw))] ^= 1 << rng.randrange(8)
+    path.write_bytes(raw)
+
+
+def torture(request, place, undisturbed, kills, rng=None):
+    """Stop a request again and again, with one worker or two; then let it end.
+
+    rng: of the moments; None: as soon as something more is kept."""
+    partial = place / f".{REQUESTS[request].split()[-1]}.partial"
     for bout in range(kills):
-        before = size()
-        process = begun(args, out, place, 1 + bout % 2)
-        assert process.stdout.readline() == "begun\n"
-        until = time.monotonic() + rng.uniform(0.05, 0.8)
-        while process.poll() is None and (
-            size() <= before if early else time.monotonic() < until
-        ):
+        before = size(partial)
+        process = begun(request, place, 1 + bout % 2)
+        if rng is not None:
+            time.sleep(rng.uniform(0.05, 0.8))
+        while rng is None and process.poll() is None and size(partial) <= before:
             time.sleep(0.005)
         if process.poll() is not None:  # it was through
-            process.communicate()
-            assert (place / out).read_bytes() == whole
-            (place / out).unlink()
+            assert output(process, place) == undisturbed
             continue
-        err = ended(process, number := numbers[bout % len(numbers)])
-        seen.add(number)
-        if number != signal.SIGKILL:
-            if not err:  # it had not yet begun to hear
-                continue
-            assert err.splitlines()[-1].startswith(
-                f"error: stopped by {number.name}: "
-            ), err
-            kept = re.search(
-                r"(\d+) results so far are kept in (.*): the same command", err
-            )
-            assert kept is None or (kept[2] == partial.name and partial.exists())
-        if size():
-            if bout % 5 == 2:
-                raw = bytearray(partial.read_bytes())
-                raw[rng.randrange(len(raw))] ^= 1 << rng.randrange(8)
-                partial.write_bytes(raw)
-            else:
-                some = Store(partial)  # what a kill leaves is whole
-                some.close(done=False)
-    process = begun(args, out, place, 1)
-    _, err = process.communicate(timeout=100)
-    assert process.returncode == 0, err
-    assert (place / out).read_bytes() == whole
-    left = {p.name for p in place.iterdir()} - {"glass.toml", "sandfish.toml", out}
-    assert all(
-        re.fullmatch(rf"\.{out}\.partial\.unreadable(-\d)?|\.geomech-.*", x)
-        for x in left
-    ), left
-    (place / out).unlink()
-    return seen
-
-
-def quiet(name, place):
-    """The output of a request that nobody disturbs."""
-    args, out = REQUESTS[name]
-    process = begun(args, out, place, 1)
-    _, err = process.communicate(timeout=100)
-    assert process.returncode == 0, err
-    try:
-        return (place / out).read_bytes()
-    finally:
-        (place / out).unlink()
+        number = SIGNALS[bout % len(SIGNALS)]
+        check_words(ended(process, number), number, partial)
+        if partial.exists() and bout % 5 == 2:
+            flip_a_bit(partial, rng)
+        elif partial.exists():
+            Store(partial).close(done=False)  # what a kill leaves is whole
+    assert output(begun(request, place), place) == undisturbed
+    left = {p.name for p in place.iterdir()} - {*SCENES}
+    strays = rf"\{partial.name}\.unreadable(-\d)?|\.geomech-.*"
+    assert all(re.fullmatch(strays, name) for name in left), left
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
+def undisturbed(tmp_path_factory):
     """The sweep that nobody disturbs, by this process."""
-    (args, out), folder = REQUESTS["sweep"], scenes_in(tmp_path_factory.mktemp("quiet"))
-    assert geomech(*args, "--workers", "1", "-o", out, cwd=folder)[0] == 0
-    return (folder / out).read_bytes()
+    folder = tmp_path_factory.mktemp("quiet")
+    (folder / "glass.toml").write_text(GLASS)
+    line = REQUESTS["sweep"].split()
+    assert geomech(*line, "--workers", "1", cwd=folder)[0] == 0
+    return (folder / "out.nc").read_bytes()
 
 
-def test_kills_and_interrupts_change_no_digit(place, whole):
-    assert len(tortured("sweep", place, whole, 2, 0, early=True)) == 2
+def test_kills_and_interrupts_change_no_digit(place, undisturbed):
+    torture("sweep", place, undisturbed, 2)
 
 
 @pytest.mark.soak
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("name", REQUESTS)
-def test_torture(name, seed, place):
-    tortured(name, place, quiet(name, place), 14, seed)
+@pytest.mark.parametrize("request_name", REQUESTS)
+def test_kills_at_any_moment_change_no_digit(request_name, seed, place):
+    undisturbed = output(begun(request_name, place), place)
+    torture(request_name, place, undisturbed, 14, random.Random(seed))
 
 
-def test_a_rival_is_refused_and_a_full_disk_is_no_obstacle(place, whole):
-    """A limit on the size of files stands for the disk: room for the output, and not for what is kept."""
-    args, out = REQUESTS["sweep"]
+def test_a_rival_is_refused_and_a_full_disk_is_no_obstacle(place, undisturbed):
+    """A limit on the size of files leaves room for the output, not for what is kept."""
     size = 16_000
-    assert len(whole) < size
-    limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
-    first = begun(args, out, place, 1, preexec_fn=limit)
-    while not (place / f".{out}.partial").exists():
+    assert len(undisturbed) < size
+
+    def limit():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+    first = begun("sweep", place, preexec_fn=limit)
+    while not (place / ".out.nc.partial").exists():
         assert first.poll() is None, first.communicate()
         time.sleep(0.005)
-    second = geomech(*args, "-o", out, cwd=place)
-    assert second == (2, "", f"error: another computation to {out} is under way: wait for it, stop "
-        "it, or choose another output with -o\n")  # fmt: skip
+    code, out, err = geomech(*REQUESTS["sweep"].split(), cwd=place)
+    assert (code, out) == (2, "")
+    cure = "wait for it, stop it, or choose another output with -o"
+    assert err == f"error: another computation to out.nc is under way: {cure}\n"
     _, err = first.communicate(timeout=100)
-    assert (
-        first.returncode == 0
-        and err.count("note: what is done is not kept in .out.nc.partial: ") == 1
-    ), err
-    assert (place / out).read_bytes() == whole
-    assert {p.name for p in place.iterdir()} == {"glass.toml", "sandfish.toml", out}
+    assert first.returncode == 0, err
+    assert err.count("note: what is done is not kept in .out.nc.partial: ") == 1
+    assert (place / "out.nc").read_bytes() == undisturbed
+    assert {p.name for p in place.iterdir()} == {*SCENES, "out.nc"}
