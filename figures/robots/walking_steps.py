@@ -17,7 +17,7 @@ from geomech.scenes import load
 from rft.terradynamics.walking import Tripod, Walker
 from rft.terradynamics.walking.planar.equations import State
 from rft.terradynamics.walking.planar.march import step
-from rft.terradynamics.walking.planar_walk import _strides
+from rft.terradynamics.walking.planar_walk import batch_strides
 
 STEPS = {
     "implicit": (12, 24, 48, 96, 192, 384),
@@ -46,7 +46,7 @@ def progress(frequency: float, steps: int, how: str, cycles: float = 1.5):
     """Return the progress, m, and the residual of the balance of energy over the work,
     after some cycles from rest."""
     scene = load("xplorer")
-    robots = _strides(
+    robots = batch_strides(
         [Walker(scene.robot, Tripod(frequency), scene.medium)], scene.numerics
     ).robots
     state = first = robots.start()
