@@ -300,16 +300,13 @@ def test_a_mesh_geom_bears_as_a_mesh_of_a_file():
 @pytest.mark.parametrize(
     "text", ["", "# nothing yet\n", "[medium]\n", '[medium]\ntension = "cut"\n']
 )
-def test_a_medium_without_a_strength_is_refused(text, tmp_path):
+@pytest.mark.parametrize("name", ["c-leg", "sphere"])
+def test_a_medium_without_a_strength_is_refused(name, text, tmp_path):
     file = tmp_path / "sand.toml"
     file.write_text(text)
     with pytest.raises(ValueError, match="sand.toml:? has no strength"):
         geomech.medium(file)
-    for name in ("c-leg", "sphere"):
-        whole = scenes.load(name).text
-        scene = whole.replace('name = "poppy-seeds-loose"', f'file = "{file}"')
-        assert scene != whole
-        with pytest.raises(ValueError, match="sand.toml:? has no strength"):
-            scenes.parse(scene)
-    file.write_text(f"{text}zeta = 1.0\n")
-    assert geomech.medium(file).zeta == 1.0
+    whole = scenes.load(name).text
+    scene = whole.replace('name = "poppy-seeds-loose"', f'file = "{file}"')
+    with pytest.raises(ValueError, match="sand.toml:? has no strength"):
+        scenes.parse(scene)
