@@ -12,7 +12,6 @@ from tabled import tabled
 from figures.grains import beds as beds_figure
 from figures.grains import plates as plates_figure
 from figures.grains.campaigns import grains as campaign
-from figures.grains.campaigns import swim_budget as budget
 from figures.paper.fig08a_rods import on_face
 from geomech import load_result, scenes
 from geomech.questions.grains.drag_grains import DragGrains
@@ -27,7 +26,7 @@ from geomech.studies.terradynamics.calibration import rod_fit
 from rft import EndCaps, Granular
 from rft.effects.transient import AT_ONCE, AT_ONCE_ALONG, RATIO
 from rft.fits.rods import fit
-from rft.grains import Bed, Run
+from rft.grains import Bed
 from rft.laws.drag import Rod, rod_drag
 from rft.terradynamics.plates import StressMap
 
@@ -273,63 +272,6 @@ def test_the_figure_of_grains_shows_beds_beside_laws():
     drawn = circles.lines[2].get_ydata()
     np.testing.assert_array_equal(drawn, curves["direct"]["distance"])
     assert "circle 1 rad" in beds_figure.table(numbers)
-
-
-QUESTION = grain_swim.GrainSwim(scenes.load("three-link-glass"), cycles=1, radius=2e-3)
-
-
-def swum_by_law(system, caps):
-    """Return a run, as of grains, of a swimmer that obeys the law with end caps."""
-    n = budget.PHASES
-    gait = QUESTION.scene.gait
-    phases = 2 * np.pi * (np.arange(n) + 0.5) / n
-    shapes = [np.array([g(t) for t in phases]) for g in (gait.shape, gait.rate)]
-    capped = dataclasses.replace(system, effects=(caps,))
-    xi = 2 * np.pi * capped.velocity(*shapes) * [0.162, 0.162, 1.0]
-    body = budget.points(QUESTION)
-    force = budget.law_forces(body, rod_fit("flank-drag", end_caps="fitted"), caps, xi)
-    # In grains the sphere at a tip bears its force.
-    force[:, 1] += force[:, 0]
-    force[:, -2] += force[:, -1]
-    samples = 5
-    rest = 5 * n // 2
-    h = 1 / (samples * n)
-    xi = np.repeat(xi, samples, 0)
-    heading = np.cumsum(xi[:, 2]) * h
-    # At the middle of each phase.
-    middle = heading[samples - 1 :: samples] - xi[::samples, 2] / n / 2
-    turn = np.repeat(np.exp(1j * middle), samples)
-    place = np.cumsum((xi[:, 0] + 1j * xi[:, 1]) * turn) * h
-    world = np.repeat((force * body.heading)[:, 1:-1], samples, 0) * turn[:, None]
-    pose = np.stack([place.real, place.imag, heading], -1)
-    profile = np.stack([world.real, world.imag, 0 * world.real], -1)
-    pose, profile = (
-        np.concatenate([np.zeros((rest, *x.shape[1:])), x]) for x in (pose, profile)
-    )
-    t = h * np.arange(1, len(pose) + 1)
-    nothing = np.zeros((len(pose), 3))
-    return Run(
-        t, nothing, t, profile, t, pose, *[nothing] * 2, t, t, *[nothing] * 2, {}
-    )
-
-
-@pytest.mark.parametrize("factor", [1, 5])
-def test_the_budget_of_a_swim_finds_which_force_is_another(factor):
-    """A body that obeys a law with five times the ends: the difference is theirs."""
-    law = rod_fit("flank-drag", end_caps="fitted")
-    caps = law.caps(2e-3 / 0.162)
-    other = dataclasses.replace(caps, head=factor * caps.head, tail=factor * caps.tail)
-    system = dataclasses.replace(QUESTION.swimmer, medium=law.medium)
-    (swum,) = budget.budget(QUESTION, swum_by_law(system, other), law, caps)
-    by_law, found = (
-        budget.distance(xi, 1 / budget.PHASES)[0] for xi in (swum.xi_0, swum.xi)
-    )
-    parts = {name: share.sum() for name, share in swum.shares.items()}
-    of_ends = parts["ends, along"] + parts["ends, across"]
-    tolerance = 0.01 * by_law + 0.1 * abs(found - by_law)
-    assert of_ends == pytest.approx(found - by_law, abs=tolerance)
-    assert sum(parts.values()) == pytest.approx(found - by_law, rel=1e-9)
-    assert (found < 0.85 * by_law) == (factor == 5)
 
 
 def test_rows_of_a_bar_in_grains_add_up_to_it():

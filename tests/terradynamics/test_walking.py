@@ -15,9 +15,8 @@ from tabled import of_swept
 from figures.paper import fig12_walking
 from figures.robots import walking_sensitivity, walking_steps
 from figures.terradynamics import wheel as wheel_figure
-from geomech import plots, scenes
+from geomech import scenes
 from geomech.plots import films
-from geomech.plots.terradynamics.walking import walk_stage
 from geomech.questions.terradynamics.walk import Walk
 from geomech.studies.displacement.sweep import Plan
 from geomech.studies.terradynamics import walking
@@ -257,7 +256,9 @@ ABSURD = {
     "top-heavy": xplorer(inertia=1e-12),
     "fast": xplorer(frequency=200.0),
     "hard ground": Walker(XPLORER.robot, Tripod(2.0), StressMap(zeta=1e6, grazing=0.1)),
-    "all jumps": Walker(XPLORER.robot, Tripod(2.0), StressMap(zeta=0.3, grazing=0.0, tension="cut")),
+    "all jumps": Walker(
+        XPLORER.robot, Tripod(2.0), StressMap(zeta=0.3, grazing=0.0, tension="cut")
+    ),
 }
 
 
@@ -617,21 +618,6 @@ def test_a_walk_may_be_over_before_its_first_step():
     assert found.speed > 0.0
     assert found.unaccounted == 0.0
     assert walking.cost_of_transport(XPLORER, found) == math.inf
-
-
-def test_axes_of_a_film_hold_the_whole_way_or_go_with_the_robot():
-    result = Walk(QUICK_XPLORER).ask()
-    x = result["x"].values
-    rows = np.array([0, 5, len(x) - 1])
-    limits = []
-    for follow in (False, True):
-        ax = plots.figure(4, 2)[1][0, 0]
-        update = walk_stage(ax, result, rows, follow)
-        limits.append(np.array([update(row) or ax.get_xlim() for row in rows]))
-    fixed, moving = limits
-    assert (np.ptp(fixed, axis=0) == 0).all()
-    assert fixed[0, 0] < x[rows].min() < x[rows].max() < fixed[0, 1]
-    np.testing.assert_allclose(moving.mean(1), x[rows])
 
 
 def test_films_of_quick_gaits_are_slowed_down(tmp_path):
