@@ -64,9 +64,9 @@ def by_definition(beta, gamma, coefficients=GENERIC):
 def random_motions(count, seed=0):
     """Return poses about the surface and twists that mix travel and turning."""
     rng = np.random.default_rng(seed)
-    pose = rng.uniform([-1, -0.08, -3], [1, 0.04, 3], (count, 3))
-    speed = 10 ** rng.uniform(-2, 2, (count, 1))
-    return pose, rng.normal(size=(count, 3)) * [0.05, 0.05, 1.0] * speed
+    pose = rng.uniform([[-1], [-0.08], [-3]], [[1], [0.04], [3]], (3, count)).T
+    twist = rng.normal(size=(count, 3)) * [0.05, 0.05, 1.0]
+    return pose, twist * 10 ** rng.uniform(-2, 2, (count, 1))
 
 
 @pytest.mark.parametrize(
