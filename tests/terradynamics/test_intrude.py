@@ -159,7 +159,7 @@ def test_forces_of_a_scene_are_those_of_its_body_on_its_motion(name):
     "name", ["c-leg", "reversed-c-leg", "half-cylinder", "round-rod"]
 )
 def test_the_error_of_the_elements_is_told(name, tension, factor, low, high, elements):
-    """From twice as many; of first order, with tension cut, from three times as many."""
+    """From twice as many; of first order, with tension cut, from thrice as many."""
     scene = scenes.load(name)
     stress = dataclasses.replace(scene.medium, tension=tension)
     scene = scene.changed(medium=stress, elements=elements)

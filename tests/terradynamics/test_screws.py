@@ -191,7 +191,7 @@ def at_rest(**changes):
 
 
 def test_limits_of_the_blade():
-    """A smooth core slides along itself; thrust goes with the blade. A blade of no pitch
+    """A smooth core slides along itself; thrust goes with the blade. One of no pitch
     is a row of rings, which slide, too; one of any pitch a paddle."""
     thrust = at_rest().thrust
     heights = np.array([4e-4, 2e-4, 1e-4])
@@ -208,8 +208,8 @@ def test_limits_of_the_blade():
 
 @pytest.mark.parametrize(("pair", "rest"), [("mirrored", 2e-3), ("alike", 1e-4)])
 def test_a_craft_is_in_balance_as_it_goes_on(pair, rest):
-    """Told anew, screw by screw, at the pose and velocity that were found. In the mirror
-    the surface cuts triangles otherwise."""
+    """Told anew, screw by screw, at the pose and velocity that were found. The surface
+    cuts triangles otherwise in the mirror."""
     craft = dataclasses.replace(CRAFT, pair=pair)
     found = cruise(SAND, craft, 2.0, **COARSE)
     body = Rotation.from_euler("xy", [found.roll, found.pitch]).as_matrix()
@@ -263,9 +263,9 @@ LARGE_CRAFT = Screws(2.5**3 * 0.25, 0.5, 0.4, 0.1, LARGE_SCREW, track=0.3, drop=
     ],
 )
 def test_craft_of_other_sizes_and_gravity_go_alike(ground, craft, rate, size):
-    """Lengths by L, mass by L^3 on the same ground, and ground as strong as the craft is
-    heavy: the same slip, the granular scaling laws of Slonaker et al. (2017), found for
-    craft on screws by Thoesen et al. (2019, 2020)."""
+    """Lengths by L, mass by L^3 on the same ground, and ground as strong as the craft
+    is heavy: the same slip, the granular scaling laws of Slonaker et al. (2017), found
+    for craft on screws by Thoesen et al. (2019, 2020)."""
     one = cruise(SAND, CRAFT, **COARSE)
     other = cruise(ground, craft, rate, **COARSE)
     assert other.slip == pytest.approx(one.slip, abs=1e-4)

@@ -54,7 +54,7 @@ def soup():
 
 
 def with_corner_on_an_edge(with_flat):
-    """Return a box of which one triangle is cut in two at an edge, its neighbour not."""
+    """Return a box of which a triangle is cut in two at an edge, its neighbour not."""
     a, b, c = CUBE.faces[0]
     m = len(CUBE.vertices)
     middle = (CUBE.vertices[a] + CUBE.vertices[b]) / 2

@@ -44,7 +44,7 @@ def test_alpha_at_plain_angles(angles, expected):
 
 
 def test_alpha_is_the_published_sum_of_terms():
-    """By angles and along r, theta, z, as it is written in the source, over all three."""
+    """By angles and along r, theta, z, as in the source, over all three."""
     beta, gamma, psi = RNG.uniform(-np.pi / 2, np.pi / 2, (3, 200))
     x1 = np.sin(gamma)
     x2 = np.cos(beta)

@@ -136,7 +136,7 @@ def test_named_media_have_their_strength_and_take_power_at_all_angles(name):
 
 
 def test_the_generic_map_pulls_on_13_percent():
-    """Of faces that move forwards on those whose normal points 53 degrees up or more."""
+    """Of faces that move forwards on those that look up by 53 degrees or more."""
     assert survey(M0).pulling == pytest.approx(0.13, abs=0.005)
     up = np.linspace(1, 89, 177) * RAD
     a_x, a_z = M0.alpha((np.cos(up), np.sin(up)), (1.0, 0.0))

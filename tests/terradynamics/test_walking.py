@@ -471,7 +471,7 @@ def test_the_rounding_of_slow_legs_is_a_twentieth_of_the_speed_of_their_ends():
 @pytest.mark.parametrize("robot", [ROBOT, walking_sensitivity.Sheet(**vars(ROBOT))])
 @pytest.mark.parametrize("tension", ["keep", "cut"])
 def test_forces_are_the_sum_over_legs_and_belly(tension, robot):
-    """At 30 m/s the rounding does not matter. A belly that is an open sheet moves up."""
+    """At 30 m/s the rounding is of no account. A belly that is a sheet moves up."""
     effects = (GrainInertia(0.5, 300.0),)
     stress = dataclasses.replace(SAND, grazing=1e-9, tension=tension)
     gait = Tripod(1.3, 0.4, 1.1)
