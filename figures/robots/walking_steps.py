@@ -18,7 +18,7 @@ from geomech.scenes import load
 from rft.terradynamics.walking import Tripod, Walker
 from rft.terradynamics.walking.planar.equations import State
 from rft.terradynamics.walking.planar.march import step
-from rft.terradynamics.walking.planar_walk import _strides
+from rft.terradynamics.walking.planar_walk import batch_strides
 
 STEPS = {
     "implicit": (12, 24, 48, 96, 192, 384),
@@ -61,7 +61,7 @@ def progress(
     after some cycles from rest; both infinite for a robot that is thrown off."""
     scene = load("xplorer")
     walker = Walker(scene.robot, Tripod(frequency), scene.medium)
-    robots = _strides([walker], scene.numerics).robots
+    robots = batch_strides([walker], scene.numerics).robots
     take_step = METHODS[method]
     dt = 1 / (steps * frequency)
     start = robots.start()

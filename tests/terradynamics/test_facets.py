@@ -1,4 +1,5 @@
-"""Forces of grains on many bodies at once: triangles below the surface, and the planar map in three dimensions."""
+"""Forces of grains on many bodies at once: triangles below the surface, and the planar
+map in three dimensions."""
 
 import dataclasses
 import math
@@ -33,11 +34,17 @@ def test_what_of_a_triangle_is_below_is_what_cutting_it_leaves():
     corners = RNG.uniform(-1, 1, (500, 3, 3))
     share, middle, moments = submerged_part(corners[..., 2].T)
     parts, of = below(corners, corners[..., 2])
-    area = lambda p: (
-        np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=-1) / 2
-    )
-    whole, each, depth = area(corners), area(parts), -parts[..., 2]
-    sums = lambda x: np.stack([np.bincount(of, y, len(corners)) for y in x.T], -1)
+
+    def area(p):
+        sides = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+        return np.linalg.norm(sides, axis=-1) / 2
+
+    def sums(x):
+        return np.stack([np.bincount(of, y, len(corners)) for y in x.T], -1)
+
+    whole = area(corners)
+    each = area(parts)
+    depth = -parts[..., 2]
     np.testing.assert_allclose(share * whole, sums(each[:, None])[:, 0], atol=1e-14)
     first = sums(each[:, None] * parts.mean(1))
     np.testing.assert_allclose(
@@ -63,8 +70,13 @@ def test_a_stress_map_of_three_dimensions_is_the_planar_one_in_every_vertical_pl
     stress = StressMap(A00=0.2, D10=0.05, zeta=0.7, tension=tension)
     (b, g), turn = RNG.uniform(-np.pi, np.pi, (2, 300)), RNG.uniform(0, 2 * np.pi, 300)
     n, v = np.array([np.sin(b), -np.cos(b)]), np.array([np.cos(g), -np.sin(g)])
-    raised = lambda a: np.array([a[0] * np.cos(turn), a[0] * np.sin(turn), a[1]])
-    planar = lambda stress: 1e6 * raised(np.array([[-1.0], [1.0]]) * stress.alpha(n, v))
+
+    def raised(a):
+        return np.array([a[0] * np.cos(turn), a[0] * np.sin(turn), a[1]])
+
+    def planar(stress):
+        return 1e6 * raised(np.array([[-1.0], [1.0]]) * stress.alpha(n, v))
+
     found, wanted = (
         np.stack(Extruded(stress).traction(raised(n), raised(v))),
         planar(stress),
@@ -98,11 +110,18 @@ class Poses(NamedTuple):
 
 
 def loads(surfaces, grains, at):
-    """Forces and moments (B, 6) on the bodies of surfaces, one or more to a body, in the world."""
+    """Return forces and moments (B, 6) on the bodies of surfaces, one or more to a
+    body, in the world."""
+
+    def joined(parts, name):
+        return np.concatenate([getattr(p, name) for p in parts])
+
+    def along(v):
+        return np.einsum("bij,bi->bj", at.rotation, v)[:, None]
+
     own = {}
     for one in surfaces:
         own.setdefault(one.body, []).append(one)
-    joined = lambda parts, name: np.concatenate([getattr(p, name) for p in parts])
     blocks = Blocks(
         [
             faces(
@@ -114,7 +133,6 @@ def loads(surfaces, grains, at):
         ]
     )
     turn, (x, _, z) = at.rotation, at.place.T
-    along = lambda v: np.einsum("bij,bi->bj", turn, v)[:, None]
     motions = Motion(
         along(at.velocity),
         along(at.spin),
@@ -227,7 +245,7 @@ def test_loads_on_outlines_in_their_plane_are_those_of_the_plane(shape):
 
 
 def test_what_moves_aside_is_held_back():
-    """A box that turns and drifts to its left feels a force to its right; grains never drive."""
+    """A box that turns and drifts to its left feels a force to its right."""
     box = [Surface.from_mesh(0, shapes.box((0.1, 0.05, 0.03), 3))]
     for law in (SPATIAL, Extruded(SAND)):
         for grains in (Grains(law), Grains(law, flux=500.0)):

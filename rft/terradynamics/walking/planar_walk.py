@@ -113,7 +113,7 @@ def _batch_key(walker: Walker, elements: int) -> str:
     return repr(key)
 
 
-def _strides(
+def batch_strides(
     walkers: Sequence[Walker], numerics: Fineness, advance: Callable = compute_stride
 ) -> Strides:
     """Return the strides of a batch of walkers."""
@@ -138,7 +138,7 @@ def _walk_batch(
     advance: Callable,
 ) -> list[Walk]:
     """Return the walks of one batch of walkers."""
-    strides = _strides(walkers, numerics, advance)
+    strides = batch_strides(walkers, numerics, advance)
     if cycles:
         durations = cycles / strides.frequency
     else:
@@ -227,7 +227,7 @@ def _fields_at_limits(
 ) -> list[dict]:
     """Return the fields of `Walk` that belong to the limit cycles, from states near
     them."""
-    strides = _strides(walkers, numerics, advance)
+    strides = batch_strides(walkers, numerics, advance)
     cycles = limit_cycles(strides, limits)
     return [_limit_fields(strides, cycles, k) for k in range(len(limits))]
 
@@ -302,7 +302,7 @@ def step_cost(
 ) -> tuple[float, float]:
     """Return the cost of a time step; see
     `rft.terradynamics.walking.engines.Engine.step_cost`."""
-    strides = _strides(walkers, numerics)
+    strides = batch_strides(walkers, numerics)
     robots = np.arange(len(walkers))
     end_heights = (strides.top, strides.airborne_height)
     state = strides.robots.start()

@@ -57,7 +57,8 @@ def sound(
     Examples
     --------
     >>> import numpy as np
-    >>> from rft.terradynamics.meshes.surfaces import shapes, sound
+    >>> from rft.terradynamics.meshes import sound
+    >>> from rft.terradynamics.meshes.surfaces import shapes
     >>> ball, hole = shapes.sphere(0.02, 2), shapes.sphere(0.01, 2)
     >>> vertices = np.concatenate([ball.vertices, hole.vertices])
     >>> faces = np.concatenate([ball.faces, hole.faces[:, ::-1] + len(ball.vertices)])
