@@ -331,15 +331,6 @@ def test_a_broken_package_is_named_in_one_line(code, package):
     assert "\n" not in str(caught.value)
 
 
-def test_a_law_that_is_viscous_moves_a_swimmer_as_the_viscous_law(tmp_path):
-    (tmp_path / "own.py").write_text(LAW)
-    load_file(tmp_path / "own.py")
-    thick = parse(SCENE).system
-    viscous = Swimmer(Viscous(2.5), thick.body)
-    nets = [system.run(*Circle().cycle(32)).net for system in (thick, viscous)]
-    np.testing.assert_allclose(*nets, atol=1e-9)
-
-
 def test_end_caps_take_the_numbers_of_a_granular_law():
     bare = Bare(Granular(C=1.8, gamma0=0.24))
     with pytest.raises(ValueError, match="end caps take a granular medium, got Bare"):

@@ -277,7 +277,7 @@ def test_five_members_and_functions_go_through_everything(system, tmp_path):
     best = optimise(scene, harmonics=1, limits=1.2)
     assert best.value > np.hypot(*truth[-1, :2])
     plots.save(plots.displacement_figure({"circle": result}), tmp_path / "a.png")
-    assert diagnosed_velocity(system, [0.1, 0.2], [1.0, 0.0])["status"] == "exact"
+    assert diagnosed_velocity(scene.system, [0.1, 0.2], [1.0, 0.0])["status"] == "exact"
     assert study.cost([0.3], study.tiers).balances > 0
 
 

@@ -116,7 +116,11 @@ def distances(net, truth):
 @pytest.fixture(scope="module")
 def family():
     scene = scenes.load("three-link-glass").with_numerics(grid=21, harmonics=9)
-    return Lab((scene,), {"medium.C": [1.0, 1.5, 2.2, 3.0]}).charts()
+    fractions = []
+    lab = Lab((scene,), {"medium.C": [1.0, 1.5, 2.2, 3.0]})
+    found = lab.charts(fractions.append)
+    assert fractions == sorted(fractions) and fractions[-1] == 1.0
+    return found
 
 
 def test_a_family_has_the_scene_as_a_member(family):

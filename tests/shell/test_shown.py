@@ -2,6 +2,7 @@
 
 import base64
 import dataclasses
+import itertools
 import pickle
 import re
 import sys
@@ -181,13 +182,20 @@ def of_length(length):
     return tables, tables.displacements([0.5, 1.0], ["area", "path", "direct"])
 
 
+def units_of(variable):
+    return np.atleast_1d(variable.unit).tolist()
+
+
 def assert_scaled(found, plain, length):
     """Assert that variables are those of a body of length 1, times its length where
     their unit has an m."""
     for variable in found.variables:
         if variable.values.dtype.kind != "f" or variable.name == "seconds":
             continue
-        factor = length if variable.unit.partition("/")[0] == "m" else 1.0
+        factors = [length if u.startswith("m") else 1.0 for u in units_of(variable)]
+        factor = np.array(factors).reshape(
+            -1, *np.ones(max(variable.values.ndim - 1, 0), int)
+        )
         for name in ("values", "error", "spread"):
             expected = getattr(plain[variable.name], name)
             if expected is not None:
@@ -198,7 +206,7 @@ def assert_scaled(found, plain, length):
 def test_lengths_of_a_table_are_in_the_unit_that_is_told_beside_them():
     _, plain = of_length(None)
     _, table = of_length(7.5)
-    units = {v.unit for v in table.variables}
+    units = {*itertools.chain(*map(units_of, table.variables))}
     assert units == {"", "m", "m/s", "BL/s", "rad", "rad/s", "rad2", "s", "1"}
     of_body = [v.name for v in table.variables if v.unit == "BL/s"]
     assert of_body == ["speed_body_lengths"]

@@ -324,12 +324,12 @@ def costs():
                     continue
                 with frozen.place():
                     frozen.geomech(*words.split())
-                (asked,) = told
+                for asked in told:  # none of a scene that is refused
+                    numbers = [asked.balances, asked.memory]
+                    if kind != "walker":
+                        numbers += [asked.seconds, asked.besides, asked.steps]
+                    yield f"cost, {words}", numbers
                 told.clear()
-                numbers = [asked.balances, asked.memory]
-                if kind != "walker":
-                    numbers += [asked.seconds, asked.besides, asked.steps]
-                yield f"cost, {words}", numbers
 
 
 # The quick ones first, each with what the names of its entries begin with.
