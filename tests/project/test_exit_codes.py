@@ -1,4 +1,5 @@
-"""How a command may end beside 0 with its answer, which data/commands.txt has: 2 with one line, 130 or 143 when stopped."""
+"""How a command may end beside 0 with its answer, which data/commands.txt has: 2 with
+one line, 130 or 143 when stopped."""
 
 import signal
 import sys
@@ -47,7 +48,8 @@ SOLVING = {  # what each command that solves for velocities takes beside its sce
 
 @pytest.fixture
 def ended(tmp_path, monkeypatch):
-    """Runs a command in a folder with a small scene: (exit code, standard output, standard error, files left)."""
+    """Runs a command in a folder with a small scene: (exit code, standard output,
+    standard error, files left)."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "small.toml").write_text(SMALL)
     files = lambda: {p.name for p in tmp_path.iterdir()} - {"small.toml"}

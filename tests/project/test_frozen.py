@@ -1,4 +1,5 @@
-"""Words and files are what they were: commands and what they write, refusals and what they name, keys of scenes."""
+"""Words and files are what they were: commands and what they write, refusals and what
+they name, keys of scenes."""
 
 import json
 import os
@@ -75,7 +76,8 @@ def inline(value):
 
 
 def with_wrong(head, table, kind, key):
-    """A scene, as TOML, whose key in this table, of this kind, is a table where it takes none."""
+    """A scene, as TOML, whose key in this table, of this kind, is a table where it
+    takes none."""
     base = next(
         name
         for where, name in BASES.items()

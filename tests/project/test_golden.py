@@ -1,4 +1,5 @@
-"""Every number in data/golden.json is what it was; the registry's newcomers have theirs."""
+"""Every number in data/golden.json is what it was; the registry's newcomers have
+theirs."""
 
 import math
 

@@ -1,4 +1,5 @@
-"""Laws, bodies, gaits, effects and systems of one's own: by a file, by `register`, by an installed package."""
+"""Laws, bodies, gaits, effects and systems of one's own: by a file, by `register`, by
+an installed package."""
 
 import hashlib
 import importlib.metadata

@@ -1,4 +1,5 @@
-"""Stated limits of parameters, taken at the limit, refused next to it; and stated defaults."""
+"""Stated limits of parameters, taken at the limit, refused next to it; and stated
+defaults."""
 
 import dataclasses
 import functools
@@ -70,7 +71,8 @@ MASS = {"mass": 1e-9, "frequency": 1e-3, "length": 1e-3, "drag": 1e3}
 ROBOT = functools.partial(Rhex, 0.15, 0.13, 0.03, 0.05, CLeg(0.02, 0.01))
 LEAST, NEXT_TO_RIGHT = math.ulp(0.0), math.nextafter(math.pi / 2, 0)
 NUMBERS = [
-    # what, made of the number, the least and the largest that is taken; None: tested elsewhere
+    # what, made of the number, the least and the largest that is taken; None: tested
+    # elsewhere
     ("chain length", having(Chain, "length"), 1e-15, 1e15),
     ("waves", having(Serpenoid, "waves", elements=24), LEAST, 6.0),
     ("C", having(Granular, "C", gamma0=0.2), 0.0, 1e6),
@@ -217,7 +219,8 @@ COUNTS = [
 
 
 def ends(rows, below, above):
-    """Yield what is made, its last number and the next one, at both ends of each row."""
+    """Yield what is made, its last number and the next one, at both ends of each
+    row."""
     for name, make, least, most in rows:
         yield pytest.param(make, least, below(least), id=f"{name}, least")
         if most is not None:

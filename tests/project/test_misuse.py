@@ -1,4 +1,5 @@
-"""Slips that are likely: of unit, sign and size, and what a velocity of one's own lacks."""
+"""Slips that are likely: of unit, sign and size, and what a velocity of one's own
+lacks."""
 
 import dataclasses
 import importlib

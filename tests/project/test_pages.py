@@ -1,5 +1,6 @@
-"""The pages: README, CONTRIBUTING and those of the site: links, pictures, commands and code, as they stand there. The site's
-build (`.ci/docs`) runs the examples of the gallery and the notebooks, and finds pages that no other leads to."""
+"""The pages: README, CONTRIBUTING and those of the site: links, pictures, commands and
+code, as they stand there. The site's build (`.ci/docs`) runs the examples of the
+gallery and the notebooks, and finds pages that no other leads to."""
 
 import collections
 import itertools
@@ -63,7 +64,8 @@ def prose(page):
 
 
 def anchors(page):
-    """GitHub's anchors of the headings of a page; two headings of one name would have the same here."""
+    """GitHub's anchors of the headings of a page; two headings of one name would have
+    the same here."""
     titles = re.findall(r"^#+ (.+)$", prose(page), re.M)
     found = [
         re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles
@@ -73,7 +75,8 @@ def anchors(page):
 
 
 def links(page):
-    """Targets of the links and pictures of a page within the repository, as (file, anchor)."""
+    """Targets of the links and pictures of a page within the repository, as
+    (file, anchor)."""
     for target in re.findall(r"\]\(([^)]+)\)", prose(page)):
         if not re.match(r"[a-z]+:|/generated/", target):  # which the build makes
             path, _, anchor = target.partition("#")
@@ -81,7 +84,8 @@ def links(page):
 
 
 def commands(page):
-    """Command lines of geomech on a page, as words: of blocks, of tables and in sentences; templates with their brackets."""
+    """Command lines of geomech on a page, as words: of blocks, of tables and in
+    sentences; templates with their brackets."""
     code = [
         line
         for language in ("", "sh", "console")
@@ -161,7 +165,8 @@ def test_commands_on_all_pages_exist_with_their_options_and_names():
             assert words[0] in SHIPPED, (page, name, words)
 
 
-# They draw for seconds each: test_cli.py runs them; their options and names are looked up above.
+# They draw for seconds each: test_cli.py runs them; their options and names are looked
+# up above.
 DRAWN = {"run", "ccf", "trajectory"}
 TYPED = {" ".join(line): line for line in commands(README) if len(line) > 1 and line[0] not in DRAWN
          and not any(re.search(r"\b[A-Z]{3,}\b", word) for word in line)}  # fmt: skip

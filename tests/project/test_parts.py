@@ -1,4 +1,5 @@
-"""Parts of one's own: one of each family in a folder, one file and one decorator each, used by commands and from Python."""
+"""Parts of one's own: one of each family in a folder, one file and one decorator each,
+used by commands and from Python."""
 
 import json
 import pathlib
@@ -401,7 +402,8 @@ assert far > 0 and abs(np.log10(far / near) - order) < 0.1
 
 
 def test_a_file_in_its_folder_is_found_and_held_to_the_laws_of_its_family(tmp_path):
-    """A law, a body, an effect with a past and one on the ground; the registry of the tests has them without a line more."""
+    """A law, a body, an effect with a past and one on the ground; the registry of the
+    tests has them without a line more."""
     root = pathlib.Path(__file__).parents[2]
     shutil.copytree(root / "rft", tmp_path / "rft")
     (tmp_path / "geomech").symlink_to(root / "geomech")

@@ -1,4 +1,5 @@
-"""The import rules: rft knows nothing of geomech; of rft the pure geometry knows planar motions alone."""
+"""The import rules: rft knows nothing of geomech; of rft the pure geometry knows planar
+motions alone."""
 
 import ast
 import functools
@@ -14,11 +15,12 @@ import pytest
 from geomech.shell import describe
 
 ROOT = pathlib.Path(__file__).parents[2]
-# Beside the systems: commands list the named media and ask a stress map; an intruder has a
-# law, a body and effects but no system; a sweep puts effects side by side; a calibration
-# fits a law; a robot that walks has a map and no system, and a map of stress is written by
-# its coefficients. Workers tell the solver to take one thread, and by which back end.
-# Environments for learning stand on sand, and measured midlines are put into a medium.
+# Beside the systems: commands list the named media and ask a stress map; an intruder
+# has a law, a body and effects but no system; a sweep puts effects side by side; a
+# calibration fits a law; a robot that walks has a map and no system, and a map of
+# stress is written by its coefficients. Workers tell the solver to take one thread, and
+# by which back end. Environments for learning stand on sand, and measured midlines are
+# put into a medium.
 KNOW_MECHANICS = {
     "gym/hexapod.py",
     "run/backend.py",
@@ -115,7 +117,8 @@ def imported():
 
 
 def test_imports_make_no_circle(imported):
-    """Counting what is imported by name; that a package loads before its modules is Python's affair."""
+    """Counting what is imported by name; that a package loads before its modules is
+    Python's affair."""
     assert sum(map(len, imported.values())) > 800
     graphlib.TopologicalSorter(imported).prepare()
 

@@ -1,4 +1,5 @@
-"""Wrong Python types are refused like wrong numbers: a ValueError of one line, from every public constructor."""
+"""Wrong Python types are refused like wrong numbers: a ValueError of one line, from
+every public constructor."""
 
 import dataclasses
 import itertools
@@ -132,7 +133,8 @@ TAKEN = {
     *itertools.product(("alpha", "alphadot", "shape"), ["array"]), *itertools.product(["times"], ("empty", "list")),
     ("effects", "empty"), ("progress", "None"), ("progress", "function"), ("a list", "list"), ("rate", "array"),
     *itertools.product(["family's amplitudes"], ("empty", "deep", "many")), ("rate", "deep"),
-    ("family's amplitudes", "array"), ("part", "class"),  # a body that is registered already
+    # a body that is registered already
+    ("family's amplitudes", "array"), ("part", "class"),
 }  # fmt: skip
 
 
@@ -147,7 +149,8 @@ def time_steps_of(**options):
     return rft.time_steps(Coulomb(), Chain(), CYCLE, CYCLE + 1, **options)
 
 
-# Calls of a wrong value by what it stands for: in mechanics, in geometry and in studies.
+# Calls of a wrong value by what it stands for: in mechanics, in geometry and in
+# studies.
 MECHANICS = [
     ("medium", lambda x: body_velocity(x, Chain(), STILL, STILL)),
     ("body", lambda x: body_velocity(Coulomb(), x, STILL, STILL)),

@@ -1,4 +1,5 @@
-"""The command line as a user meets it: in the tests' own process, and a few commands in processes of their own."""
+"""The command line as a user meets it: in the tests' own process, and a few commands in
+processes of their own."""
 
 import contextlib
 import itertools
@@ -87,8 +88,8 @@ def test_displacement_to_a_tolerance():
 
 @pytest.fixture
 def undrawn(monkeypatch):
-    """Figures are not drawn, which takes half a second each: data/commands.txt has those
-    of these commands."""
+    """Figures are not drawn, which takes half a second each: data/commands.txt has
+    those of these commands."""
 
     def touch(figure, *paths):
         for path in paths:

@@ -1,4 +1,5 @@
-"""The Python face: one study from a name or from parts, whose tables and pictures show themselves."""
+"""The Python face: one study from a name or from parts, whose tables and pictures show
+themselves."""
 
 import doctest
 import itertools

@@ -1,4 +1,5 @@
-"""Text that others wrote, in files and their names, steers no terminal and no page: it is shown with escapes."""
+"""Text that others wrote, in files and their names, steers no terminal and no page: it
+is shown with escapes."""
 
 import json
 import re
@@ -22,8 +23,10 @@ from geomech.studies.maps import fields
 from geomech.studies.scene_tables import SceneTables
 from rft.core import refusal as errors
 
-ESC = "\x1b]0;owned\x07\x1b[2J\x9b31m\u202e\r"  # sets a title, rings, clears, in red, backwards, over what stood there
-TOML = "\\u001b]0;owned\\u0007\\u001b[2J\\u009b31m\\u202e\\r"  # in a string of TOML, which holds none as it is
+# sets a title, rings, clears, in red, backwards, over what stood there
+ESC = "\x1b]0;owned\x07\x1b[2J\x9b31m\u202e\r"
+# in a string of TOML, which holds none as it is
+TOML = "\\u001b]0;owned\\u0007\\u001b[2J\\u009b31m\\u202e\\r"
 LONG = ESC + 1_000_000 * "x"
 SWIM = scenes.load("three-link-viscous").text
 
@@ -151,7 +154,8 @@ def test_names_of_files_stay_within_their_line(command, geomech, tmp_path):
 
 
 def test_bars(monkeypatch):
-    """Nor does a name that looks like rich's own marks of colours, or the end of one that was never opened, stop a bar."""
+    """Nor does a name that looks like rich's own marks of colours, or the end of one
+    that was never opened, stop a bar."""
     bars = []
 
     class Bars(rich.progress.Progress):

@@ -317,8 +317,8 @@ def points_in(state):
 
 
 def test_the_page_computes_what_python_does(opened, page):
-    """Loops of all scenes, half of which cross themselves, in both frames, at members of
-    a family and between."""
+    """Loops of all scenes, half of which cross themselves, in both frames, at members
+    of a family and between."""
     rng = np.random.default_rng(5)
     for name, chart in page[1].items():
         values = [None] if chart.family is None else [1.8, 3.0, 2.45]

@@ -1,5 +1,5 @@
-"""What every question keeps: its declaration is its command and its method, and its result
-is the same in every form."""
+"""What every question keeps: its declaration is its command and its method, and its
+result is the same in every form."""
 
 import ast
 import dataclasses

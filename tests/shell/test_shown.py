@@ -1,4 +1,5 @@
-"""What results say of themselves: a line, HTML and pictures for notebooks, data sets of xarray."""
+"""What results say of themselves: a line, HTML and pictures for notebooks, data sets of
+xarray."""
 
 import base64
 import dataclasses

@@ -1,16 +1,18 @@
 """Frozen words and files: what commands print, write and refuse, kept under data/.
 
-    python tests/tools/golden.py --write    records them; what still holds stays as it is
+    python tests/tools/golden.py --write    records them; what still holds stays as it
+    is
 
-commands.txt has command lines with their output and what they wrote, refusals.txt what is
-refused and what its message names, keys.txt every key of a scene file, the schema, names
-in Python and their defaults. They are run in a copy of data/frozen, which has scenes, and
-a file of every format as the first version with these records wrote it: later ones read
-them.
+commands.txt has command lines with their output and what they wrote, refusals.txt what
+is refused and what its message names, keys.txt every key of a scene file, the schema,
+names in Python and their defaults. They are run in a copy of data/frozen, which has
+scenes, and a file of every format as the first version with these records wrote it:
+later ones read them.
 
 Names, numbers, keys and exit codes are fixed, wording is free (`words`): of a refusal
 counts what it names, and that it says what to do. Everything goes through the command
-line, files and names of `geomech`; a move of modules needs changes in `namespace` at most.
+line, files and names of `geomech`; a move of modules needs changes in `namespace` at
+most.
 """
 
 from __future__ import annotations
@@ -167,8 +169,9 @@ def differs(old: list[str], new: list[str]) -> str:
     return ""
 
 
-# refusals.txt: under [a command, and the file that is changed] what is done to that, under [geomech] whole commands, under
-# [python] expressions; each with how it ends, what its message names, and "cure" where that says what to do.
+# refusals.txt: under [a command, and the file that is changed] what is done to that,
+# under [geomech] whole commands, under [python] expressions; each with how it ends,
+# what its message names, and "cure" where that says what to do.
 
 CURE = re.compile(  # words of a cure, or of what a value must be
     r"\?$|did you mean|\b(must|such as|possible|takes?|use|give|say|add|put|write|raise|lower|widen|leave|drop|keep|choose"
@@ -224,8 +227,8 @@ def public_names(module) -> list[str]:
 
 
 def edited(content: bytes, edits: str) -> bytes:
-    """Return what a file holds after "old => new", the first time that old is there;
-    "* => new" replaces all of it, " => new" is added at its end, and " && " goes between
+    """Return what a file holds after "old => new", the first time that old is there; "*
+    => new" replaces all of it, " => new" is added at its end, and " && " goes between
     several."""
     for edit in edits.split(" && "):
         old, new = (raw(side.strip(" ")) for side in edit.split("=>", 1))
@@ -285,7 +288,8 @@ def ended(line: str) -> tuple[str, str]:
 
 
 def named(message: str, given: str) -> list[str]:
-    """What a refusal calls by name, in its order: what `names` finds, [sections], numbers, words and keys that were given."""
+    """What a refusal calls by name, in its order: what `names` finds, [sections],
+    numbers, words and keys that were given."""
     given = given.replace("\\n", " ")
     words = {
         *re.findall(r"[A-Za-z][\w-]+", given),
@@ -359,8 +363,8 @@ def read_refusals() -> dict[tuple[str, str], str]:
 
 
 def keys() -> Iterator[str]:
-    """Every key of a scene file with its type, unit and default; the schema, less its descriptions; names in Python, and
-    what is taken where an argument is left out."""
+    """Every key of a scene file with its type, unit and default; the schema, less its
+    descriptions; names in Python, and what is taken where an argument is left out."""
     import geomech as top
 
     table = ""
@@ -386,7 +390,8 @@ def keys() -> Iterator[str]:
 
 
 def defaults(module) -> Iterator[str]:
-    """The arguments with defaults of the functions, classes and methods that a module offers."""
+    """The arguments with defaults of the functions, classes and methods that a module
+    offers."""
     for name, x in (
         (name, getattr(module, name))
         for name in dir(module)
@@ -409,8 +414,9 @@ def defaults(module) -> Iterator[str]:
 
 
 def of_schema(node, path: str = "", before: dict | None = None) -> Iterator[str]:
-    """A JSON Schema without its descriptions: a line for what takes little room, else one for each of its entries, those of
-    a list by their kind where they have one. before: what was told already, and where."""
+    """A JSON Schema without its descriptions: a line for what takes little room, else
+    one for each of its entries, those of a list by their kind where they have one.
+    before: what was told already, and where."""
     text, before = compact(undescribed(node)), {} if before is None else before
     if len(text) <= 200 or not isinstance(node, (dict, list)):
         yield f"{path} {text}"
@@ -462,7 +468,8 @@ def words_of(lines: list[str]) -> list[str]:
 
 
 def write(say=print) -> None:
-    """Records all that does not hold, and new wording; what holds keeps its digits and names."""
+    """Records all that does not hold, and new wording; what holds keeps its digits and
+    names."""
     lines = [line for line in COMMANDS.read_text().splitlines() if line.startswith("#")]
     recorded = read_commands()
     for command, new in outcomes(list(recorded)).items():

@@ -1,7 +1,8 @@
 """Golden numbers of every medium, body, effect and built-in scene, in data/golden.json.
 
     python tests/tools/golden.py            tells which entries changed, and how much
-    python tests/tools/golden.py --write    records them, and what `frozen` has; what did
+    python tests/tools/golden.py --write    records them, and what `frozen` has; what
+    did
                                             not change keeps its digits
 
 They guard against a change that nobody meant; other tests say what is right. `frozen`
@@ -49,8 +50,8 @@ from rft.terradynamics.walking import Fineness, engine
 
 FILE = pathlib.Path(__file__).parents[1] / "data" / "golden.json"
 # Tolerances, relative to the largest number of an entry: the least, that of errors and
-# of what is solved or fitted to a tolerance, and that of the residuals of rod.csv, 2e-5 N
-# of forces of 3.7 N, whose roundoff differs between processors by 4e-12 N.
+# of what is solved or fitted to a tolerance, and that of the residuals of rod.csv, 2e-5
+# N of forces of 3.7 N, whose roundoff differs between processors by 4e-12 N.
 TOLERANCE = 1e-12
 LOOSE_TOLERANCE = 1e-8
 RESIDUAL_TOLERANCE = 1e-6
@@ -224,8 +225,8 @@ def intrusions():
 
 
 def solids():
-    """Every body of three dimensions, under the ground and across its surface, plain and
-    with each effect."""
+    """Every body of three dimensions, under the ground and across its surface, plain
+    and with each effect."""
     medium = Spatial(3e5, 0.3)
     place = [(0.02, 0.1, -0.01), (-0.05, 0.0, -0.2)]
     turn = Rotation.from_rotvec([(0.3, -0.7, 0.2), (1.0, 2.0, -0.4)]).as_matrix()
@@ -282,8 +283,8 @@ MEASURED = {
 
 
 def measurements():
-    """Tables and measured gaits of data/frozen: what they predict, and what is fitted to
-    measurements."""
+    """Tables and measured gaits of data/frozen: what they predict, and what is fitted
+    to measurements."""
     with frozen.place():
         for name, line in MEASURED.items():
             yield from printed(f"measured, {name}", *line.split())

@@ -1,7 +1,9 @@
-"""Texts, JSON and files as lines, and whether such lines say the same: numbers to 1e-6, names, and no word beside.
+"""Texts, JSON and files as lines, and whether such lines say the same: numbers to 1e-6,
+names, and no word beside.
 
-Of a text its numbers count, in their order, and the names in it. A structure (JSON, TOML, a table, a file of numbers) is
-lines "path = value", which are the same but for the digits of their numbers. Times and facts of the machine are masked.
+Of a text its numbers count, in their order, and the names in it. A structure (JSON,
+TOML, a table, a file of numbers) is lines "path = value", which are the same but for
+the digits of their numbers. Times and facts of the machine are masked.
 """
 
 from __future__ import annotations
@@ -78,13 +80,15 @@ def masked(text: str) -> str:
 
 
 def number_of(word: str) -> float | None:
-    """A word as a number, of "+-1e-3", "30deg", "5%" and "8." the same; None if it is none."""
+    """A word as a number, of "+-1e-3", "30deg", "5%" and "8." the same; None if it is
+    none."""
     word = word.removeprefix("+-").rstrip(".%?!").removesuffix("deg")
     return float(word) if PLAIN_NUMBER.fullmatch(word) else None
 
 
 def numbers(text: str) -> list[tuple[float, float]]:
-    """Every number in a text with one unit of its last decimal, 0 if it has none, in their order."""
+    """Every number in a text with one unit of its last decimal, 0 if it has none, in
+    their order."""
     found = []
     for word in WORD.findall(text):
         if (x := number_of(word)) is not None:
@@ -97,7 +101,8 @@ def numbers(text: str) -> list[tuple[float, float]]:
 
 
 def names(text: str) -> set[str]:
-    """What a text calls by name: options, files, what stands in quotes or looks like code, units, and `LISTED`."""
+    """What a text calls by name: options, files, what stands in quotes or looks like
+    code, units, and `LISTED`."""
     words = {word.rstrip(".") for word in WORD.findall(text)} | set(
         re.findall(r"[^\s(),;:]+", text)
     )
@@ -157,8 +162,8 @@ def short(x) -> str:
 
 
 def of_array(values) -> str:
-    """An array on a line: all of up to twelve numbers; of more its shape, some of them, the root mean square, and a sum with
-    alternating weights, which tells what moved."""
+    """An array on a line: all of up to twelve numbers; of more its shape, some of them,
+    the root mean square, and a sum with alternating weights, which tells what moved."""
     array = np.asarray(values)
     flat = array.ravel()
     if flat.dtype.kind not in "iufb" or flat.size <= 12:
