@@ -75,17 +75,6 @@ def pytest_xdist_node_collection_finished(node):
         assert not compiled.wait(), "python -m rft"
 
 
-@pytest.hookimpl(wrapper=True)
-def pytest_collection():
-    """Tests are stored as pytest rewrites them, which takes longer than all else in
-    their collection."""
-    before, sys.dont_write_bytecode = sys.dont_write_bytecode, False
-    try:
-        return (yield)
-    finally:
-        sys.dont_write_bytecode = before
-
-
 def pytest_collection_finish():
     """What is there for good is not looked through again and again: a tenth of the
     time."""

@@ -3,15 +3,15 @@ is shown with escapes."""
 
 import json
 import re
+import shutil
 import struct
 import sys
 
 import commands
+import frozen
 import pytest
 import rich.progress
 from scipy.io import netcdf_file
-from test_mjcf import CART
-from test_mjcf import SCENE as WALKER
 
 from geomech import scenes
 from geomech.io import files, tables
@@ -209,14 +209,17 @@ def test_words_in_headers_of_csv_files_are_escaped(ask, geomech, tmp_path):
 
 @pytest.mark.parametrize(
     ("old", "new"),
-    [('name="fl"', f'name="{ESC}"'), ('name="trunk" type="box"', f'type="{ESC}"')],
+    [
+        ('<geom name="fl"', f'<geom name="{ESC}"'),
+        ('name="trunk" type="box"', f'type="{ESC}"'),
+    ],
     ids=["name", "type"],
 )
 def test_names_in_an_mjcf_are_escaped(old, new, geomech, tmp_path):
     pytest.importorskip("mujoco")
-    (tmp_path / "parts").mkdir()
-    (tmp_path / "parts" / "cart.xml").write_text(CART.replace(old, new))
-    (tmp_path / "s.toml").write_text(WALKER)
+    text = (frozen.FOLDER / "cart.xml").read_text()
+    (tmp_path / "cart.xml").write_text(text.replace(old, new))
+    shutil.copy(frozen.FOLDER / "cart.toml", "s.toml")
     code, out, err = geomech("explain", "s.toml")
     assert (code, out) == (2, "")
     shown(err)

@@ -177,15 +177,6 @@ def test_scenes_without_a_chart_are_refused_before_others_are_computed(name):
         Lab((scenes.load("three-link-glass"), scenes.load(name))).check()
 
 
-def test_the_command(tmp_path):
-    ask = ["lab", "three-link-viscous", "seven-link-modes", "-o", "lab.html"]
-    code, out, _ = geomech(*ask, cwd=tmp_path)
-    assert code == 0 and "page in lab.html" in out
-    assert "three-link-viscous  961 shapes, harmonics to 1\n" in out
-    text = (tmp_path / "lab.html").read_text(encoding="utf-8")
-    assert text.startswith("<!DOCTYPE html>")
-
-
 # In a browser
 
 
