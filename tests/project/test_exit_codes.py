@@ -52,8 +52,12 @@ def ended(tmp_path, monkeypatch):
     standard error, files left)."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "small.toml").write_text(SMALL)
-    files = lambda: {p.name for p in tmp_path.iterdir()} - {"small.toml"}
-    return lambda name: (*geomech(*name.split(), "small.toml", *SOLVING[name]), files())
+
+    def run(name):
+        told = geomech(*name.split(), "small.toml", *SOLVING[name])
+        return *told, {p.name for p in tmp_path.iterdir()} - {"small.toml"}
+
+    return run
 
 
 def test_every_command_has_its_answers_its_help_and_refusals():

@@ -134,15 +134,21 @@ def text_holds(old: str, new: str) -> bool:
     return same and names(old) <= names(new)
 
 
+def bare(text: str) -> str:
+    """Return a text with # in place of its numbers."""
+
+    def replaced(word):
+        return word[0] if number_of(word[0]) is None else "#"
+
+    return WORD.sub(replaced, text)
+
+
 def line_holds(old: str, new: str) -> bool:
     """Whether a line of a structure is the same but for the digits of its numbers."""
     if old == new:
         return True
     was, now = numbers(old), numbers(new)
     size = max((abs(x) for x, _ in was), default=0.0)
-    bare = lambda text: WORD.sub(
-        lambda word: "#" if number_of(word[0]) is not None else word[0], text
-    )
     return bare(old) == bare(new) and all(
         near(a, b, 0.0, size) for (a, _), (b, _) in zip(was, now)
     )
@@ -152,13 +158,7 @@ def line_holds(old: str, new: str) -> bool:
 
 
 def short(x) -> str:
-    return (
-        x
-        if isinstance(x, str)
-        else f"{x:.8g}"
-        if isinstance(x, (float, np.floating))
-        else str(x)
-    )
+    return f"{x:.8g}" if isinstance(x, (float, np.floating)) else str(x)
 
 
 def of_array(values) -> str:
@@ -216,9 +216,12 @@ def of_text(name: str, text: str) -> Iterator[str]:
             yield f"~ {name} = {text}"
 
 
+def decoded(x):
+    return x.decode() if isinstance(x, bytes) else x
+
+
 def of_netcdf(file: pathlib.Path) -> Iterator[str]:
     with netcdf_file(file, mmap=False) as data:
-        decoded = lambda x: x.decode() if isinstance(x, bytes) else x
         for key in sorted(data._attributes):
             yield from of_text(f":{key}", masked(short(decoded(data._attributes[key]))))
         for name in sorted(data.variables):
