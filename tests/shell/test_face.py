@@ -222,7 +222,7 @@ def packages():
                 yield module.name  # gym takes an extra
 
 
-@pytest.mark.parametrize("name", packages())
+@pytest.mark.parametrize("name", [*packages()])
 def test_packages_list_their_public_names(name):
     package = import_module(name)
     if hasattr(package, "__all__"):
