@@ -231,18 +231,6 @@ def sled(alpha, alphadot):
     return Cart().velocity(alpha, alphadot)
 
 
-def test_a_format_of_ones_own_keeps_its_limits(folder):
-    ask = ["connection", "trike.toml", "-o", "made.json", "--order", "ndgrid"]
-    said = "--order is that of a .mat file: drop it, a .json"
-    assert said in geomech(*ask, *PLUGINS)[2]
-    three = 'lengths = [1, 1, 1, 1]\n[gait]\nkind = "wave"\njoints = 3\n'
-    medium = '[medium]\nlaw = "viscous"\n[body]\nkind = "chain"\n'
-    (folder / "four.toml").write_text(medium + three)
-    told = geomech("connection", "four.toml", "-o", "four.json", *PLUGINS)
-    assert told[0] == 2
-    assert "layout of 2 joints, and this body has 3: write a .nc file" in told[2]
-
-
 @pytest.mark.parametrize("name", SCENES)
 def test_a_scene_of_parts_of_ones_own_is_written_and_read_again(name, folder):
     for part in FILES:

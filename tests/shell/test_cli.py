@@ -11,14 +11,12 @@ import threading
 
 import numpy as np
 import pytest
-import xarray
 from commands import as_process, geomech
 from scipy.io import netcdf_file
 from tabled import tabled, tabled_json
 
 from geomech import plots, scenes
 from geomech.mathematics.gaits import Butterfly, Circle, Ellipse
-from geomech.mathematics.geometry import curvature
 from geomech.results.files import load
 from geomech.studies.report import (
     compared_gaits,
@@ -29,29 +27,12 @@ from geomech.studies.report import (
 from geomech.studies.scene_tables import SceneTables
 from rft.core.refusal import Refusal
 
-SMALL = ["--grid", "9"]
-
-
 VELOCITY = ["velocity", "three-link-viscous", "--alpha", "0,0", "--alphadot", "-1,0"]
 
 
 @pytest.mark.parametrize("args", [[*VELOCITY, "--json"], ["fly"]])
 def test_a_process_says_what_the_tests_see(args):
     assert as_process(*args) == geomech(*args)
-
-
-def test_connection_is_a_self_describing_file(tmp_path):
-    files = ["-o", "a.nc", "--plot", "a.svg"]
-    ask = ["connection", "three-link-glass", *SMALL, "--extent", "2.0", *files]
-    code, _, err = geomech(*ask, cwd=tmp_path)
-    assert (code, err) == (0, "")
-    with xarray.open_dataset(tmp_path / "a.nc") as data:
-        scene = scenes.parse(data.attrs["scene_toml"])
-        again = SceneTables(scene.with_numerics(grid=9, extent=2.0)).fitted
-        np.testing.assert_array_equal(data.A, again.A)
-        np.testing.assert_array_equal(data.fit_residual, again.residual)
-        np.testing.assert_allclose(data.ccf, curvature.ccf(again).values, rtol=1e-13)
-    assert {p.name for p in tmp_path.iterdir()} == {"a.nc", "a.svg"}
 
 
 def test_displacement_to_a_tolerance():
@@ -221,14 +202,6 @@ def test_neither_are_its_measurements(ask, tmp_path):
     assert code == 2
     assert "cannot write swim.svg: it is an input" in err
     assert (tmp_path / "swim.svg").read_text() == "\n".join(rows)
-
-
-def test_one_file_is_not_two_outputs(tmp_path):
-    (tmp_path / "a.nc").write_text("")
-    (tmp_path / "a.svg").symlink_to("a.nc")
-    files = ["-o", "a.nc", "--plot", "a.svg"]
-    told = geomech("connection", "three-link-viscous", *files, cwd=tmp_path)
-    assert told[0] == 2 and "cannot write" in told[2]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere names of files are text")

@@ -137,16 +137,6 @@ def test_a_study_draws_and_films(study, tmp_path):
         study.ccf().plot(component="z")
 
 
-def test_maps_of_many_joints_are_slices():
-    four = geomech.study("viscous-2", rft.Chain((1, 1, 1, 1)), grid=5)
-    found = four.ccf((1, 3))
-    assert_allclose(found["ccf_1_3"].values, four.tables.plane((0, 2)).ccf.values)
-    assert found["ccf_1_3"].dims == ("component", "alpha_1", "alpha_3")
-    assert {"ccf_1_2", "ccf_1_3", "ccf_2_3"} <= set(four.ccf())
-    fig = four.ccf((2, 3)).plot(component=("x",))
-    assert fig.axes[0].get_xlabel() == r"$\alpha_{2}$ (rad)"
-
-
 def test_the_best_gait_is_a_scene():
     best = geomech.optimise("three-link-viscous", harmonics=1, starts=1)
     scene = geomech.best_scene(best)
@@ -160,12 +150,6 @@ def test_a_velocity_makes_a_study(study):
     options = {"limits": 1.0, "harmonics": 1}
     best = geomech.study(slide, grid=7).optimize("displacement", **options)
     assert float(best["value"]) == pytest.approx(np.pi, rel=1e-3)
-
-
-def test_a_study_makes_a_sweep(study):
-    over = {"medium.C": [1.0, 2.0]}
-    swept = geomech.sweep(study, over)
-    assert_allclose(swept["x"].values, study.sweep(over)["x"].values)
 
 
 def test_a_medium_is_fitted_to_drag(tmp_path):

@@ -118,14 +118,6 @@ def test_outputs_are_refused_before_computing(names, said, asked):
     assert "cost" not in question.told
 
 
-def test_a_result_is_a_mapping_of_variables():
-    assert list(RESULT) == ["phase", "tier", "speed"] and len(RESULT) == 3
-    assert RESULT["speed"] is SPEED
-    assert RESULT.sizes == {"phase": 3, "tier": 2} and "pace" not in RESULT
-    assert PHASE.is_coordinate and TIER.is_text
-    assert not SPEED.is_coordinate and not PHASE.is_text
-
-
 @pytest.mark.parametrize(("values", "sign"), [((1, 2, 4, 8), -1), ((8, 4, 2, 1), 1)])
 def test_an_order_is_that_of_the_error_in_the_coarseness(values, sign):
     values = np.array(values, float)

@@ -285,16 +285,6 @@ def test_a_result_made_by_hand_is_read_back(ending, tmp_path):
     assert dict(back.attributes) == dict(MADE.attributes)
 
 
-def test_other_programs_read_a_netcdf_file(tmp_path):
-    MADE.save(tmp_path / "a.nc")
-    with xarray.open_dataset(tmp_path / "a.nc") as data:
-        np.testing.assert_array_equal(data.speed_error, SPEED.error)
-        np.testing.assert_array_equal(data.speed_spread, SPEED.spread)
-        assert data.speed.dims == ("phase", "tier") and data.speed.units == "m/s"
-        assert data.speed_error.long_name == "half width"
-        assert data.attrs["scale"] == 0.1 and data.attrs["kind"] == "made"
-
-
 def test_places_are_chosen_by_their_coordinates():
     assert float(MADE.at(tier="direct", phase=1.5)["speed"]) == 3.0
     assert MADE.at(tier="direct")["speed"].unit == "m/s"
