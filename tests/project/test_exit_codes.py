@@ -101,8 +101,9 @@ def test_what_does_not_converge_ends_with_2(name, ended, monkeypatch):
     monkeypatch.setattr(rft, "body_velocity", unconverged)
     code, out, err, files = ended(name)
     assert (code, out, files) == (2, "", set())
-    (line,) = err.splitlines()
-    assert line.startswith("error: ") and "did not converge" in line
+    # On a slow machine the cost is told, too.
+    (error,) = (x for x in err.splitlines() if x.startswith("error: "))
+    assert "did not converge" in error
 
 
 def interrupt():
@@ -137,7 +138,7 @@ def test_what_is_stopped_leaves_nothing_half_written(
     stored = {".out.partial"} if "the same command goes on from there" in err else set()
     assert files == stored and (not stored or how is interrupt)
     assert said in err
-    assert err == "" or err.startswith("error: ")
+    assert err == "" or "error: " in err
 
 
 def test_an_interrupt_that_typer_catches_is_one_too(monkeypatch):
