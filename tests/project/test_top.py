@@ -82,6 +82,7 @@ def test_the_version_is_told_once_and_the_same_everywhere():
         ("geomech reference mo", {"motion"}),
         ("geomech accuracy sph", {"sphere"}),
         ("geomech walk xpl", {"xplorer"}),
+        ("geomech symbolic diff", {"differential-drive"}),
         ("geomech --ver", {"--version"}),
     ],
 )
