@@ -124,3 +124,12 @@ def test_an_order_is_that_of_the_error_in_the_coarseness(values, sign):
     errors = values ** (sign * 3)
     assert measured_order(values, errors) == pytest.approx(3.0)
     assert np.isnan(measured_order(values, np.array([*errors[:2], 1e-14, 1e-14])))
+
+
+def test_one_file_by_two_names_is_not_two_outputs(asked):
+    Path("a.csv").write_text("")
+    Path("b.csv").symlink_to("a.csv")
+    question = asked()
+    with pytest.raises(Refusal, match="cannot write"):
+        pipeline.execute(question, [output(question, x) for x in ("a.csv", "b.csv")])
+    assert "cost" not in question.told
