@@ -1,4 +1,5 @@
-"""One thread a process, as many processes as cores for the whole suite, the truths that are kept, and what solves."""
+"""One thread a process, as many processes as cores for the whole suite, the truths that
+are kept, and what solves."""
 
 import compileall
 import gc
@@ -29,7 +30,8 @@ LAID_OUT = {
 
 @pytest.fixture
 def own_parts():
-    """Parts of one's own, and the modules they came in, are forgotten after the test."""
+    """Parts of one's own, and the modules they came in, are forgotten after the
+    test."""
     from commands import own_parts
 
     with own_parts():
@@ -51,7 +53,8 @@ def pytest_configure(config):
 
 
 def pytest_sessionstart(session):
-    """Compile the balance once, while tests are read, before the processes of the whole suite would do so side by side."""
+    """Compile the balance once, while tests are read, before the processes of the whole
+    suite would do so side by side."""
     full = session.config.args_source is session.config.ArgsSource.TESTPATHS
     if full and not hasattr(session.config, "workerinput"):
         for folder in (
@@ -72,18 +75,9 @@ def pytest_xdist_node_collection_finished(node):
         assert not compiled.wait(), "python -m rft"
 
 
-@pytest.hookimpl(wrapper=True)
-def pytest_collection():
-    """Tests are stored as pytest rewrites them, which takes longer than all else in their collection."""
-    before, sys.dont_write_bytecode = sys.dont_write_bytecode, False
-    try:
-        return (yield)
-    finally:
-        sys.dont_write_bytecode = before
-
-
 def pytest_collection_finish():
-    """What is there for good is not looked through again and again: a tenth of the time."""
+    """What is there for good is not looked through again and again: a tenth of the
+    time."""
     gc.collect()
     gc.freeze()
     gc.set_threshold(20_000, 20, 50)
@@ -125,8 +119,8 @@ def pytest_collection_modifyitems(items):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_xdist_auto_num_workers(config):
-    """None (a process for each core) for the whole suite; 0 for tests picked by hand, for what prints and what
-    writes."""
+    """None (a process for each core) for the whole suite; 0 for tests picked by hand,
+    for what prints and what writes."""
     picked = config.args_source is not config.ArgsSource.TESTPATHS
     return (
         0
@@ -150,7 +144,8 @@ def no_lines_of_progress(monkeypatch):
 
 @pytest.fixture(autouse=True)
 def blank_pictures(request, monkeypatch):
-    """Pictures of dots are saved without being drawn, which takes longest; the files of LAID_OUT have all as they are."""
+    """Pictures of dots are saved without being drawn, which takes longest; the files of
+    LAID_OUT have all as they are."""
     agg = sys.modules.get("matplotlib.backends.backend_agg")
     if agg and request.module.__name__ not in LAID_OUT:
         figure = sys.modules["matplotlib.figure"].Figure
@@ -187,7 +182,8 @@ def solved_by(request):
 
 @pytest.fixture
 def geomech(tmp_path, monkeypatch):
-    """Runs a command in an empty folder: (exit code, standard output, standard error)."""
+    """Runs a command in an empty folder: (exit code, standard output, standard
+    error)."""
     from commands import geomech
 
     monkeypatch.chdir(tmp_path)

@@ -1,4 +1,5 @@
-"""Ratios measured in one run: pytest -m benchmark -s. Nothing here asserts a wall-clock time."""
+"""Ratios measured in one run: pytest -m benchmark -s. Nothing here asserts a wall-clock
+time."""
 
 import contextlib
 import importlib.util
@@ -38,7 +39,8 @@ def field_samples(points=31, count=8, extent=2.5):
 
 
 def in_turn(asked: dict, rounds: int = 5) -> dict[str, float]:
-    """Median seconds of functions that take turns, so that all meet the same moods of the machine."""
+    """Median seconds of functions that take turns, so that all meet the same moods of
+    the machine."""
     times = {name: [] for name in asked}
     for _ in range(rounds):
         for name, f in asked.items():
@@ -47,8 +49,9 @@ def in_turn(asked: dict, rounds: int = 5) -> dict[str, float]:
 
 
 def test_against_a_loop_of_fsolve():
-    """The built-in field (a quarter of it solved, the rest by symmetry), all of it, a gait of 64 phases by symmetry, with its
-    displacement, and all of its phases solved, a single velocity."""
+    """The built-in field (a quarter of it solved, the rest by symmetry), all of it, a
+    gait of 64 phases by symmetry, with its displacement, and all of its phases solved,
+    a single velocity."""
     alpha, alphadot = (x.reshape(-1, 2) for x in field_samples())
     some = np.random.default_rng(0).choice(len(alpha), 100, replace=False)
     gait = Circle().cycle(64)
@@ -109,7 +112,8 @@ def test_against_a_loop_of_fsolve():
 
 
 def test_starts():
-    """Evaluations of a load a sample, from nothing and from velocities that are at hand anyway."""
+    """Evaluations of a load a sample, from nothing and from velocities that are at hand
+    anyway."""
     for name, gait in {"circle": Circle(), "butterfly": Butterfly()}.items():
         alpha, alphadot = gait.cycle(64)
         solve = lambda step, first=0, alpha=alpha, alphadot=alphadot, **given: (
@@ -166,7 +170,8 @@ def test_a_march_of_a_hundred_elements():
 
 
 def test_direct_tier_of_a_circle_to_four_digits():
-    """One circle at the fewest phases that bring it within 1e-4 body lengths of the truth."""
+    """One circle at the fewest phases that bring it within 1e-4 body lengths of the
+    truth."""
     for how in backends():
         swimmer = lambda a, d: body_velocity(GLASS, Chain(), a, d, backend=how).xi
         for radius in (0.5, 1.0, 1.75):
@@ -185,8 +190,9 @@ def test_direct_tier_of_a_circle_to_four_digits():
 
 
 def test_the_geometers_pipeline():
-    """Connection, metric, CCF, minimum-perturbation coordinates and the displacement on a circle of the viscous three-link
-    swimmer, 31 x 31, against an fsolve loop that gives nothing but a connection, that of loose glass."""
+    """Connection, metric, CCF, minimum-perturbation coordinates and the displacement on
+    a circle of the viscous three-link swimmer, 31 x 31, against an fsolve loop that
+    gives nothing but a connection, that of loose glass."""
     scene = load("three-link-viscous").with_numerics(grid=31)
 
     def pipeline():
@@ -230,8 +236,9 @@ def test_the_geometers_pipeline():
     ["gait.amplitude=0.2:2:20", "medium.C=1:3:25", "medium.gamma0=0.15:0.4:20"],
 ], ids=["media", "media at 20 amplitudes"])  # fmt: skip
 def test_a_sweep_of_ten_thousand_points_on_two_cores(over, tmp_path):
-    """By processes against one: wall-clock time, which hangs on who else is at work, and by computing alone, of which two cores
-    could do no better than half. Amplitudes share a batch, and so little is left that a second process would not help."""
+    """By processes against one: wall-clock time, which hangs on who else is at work,
+    and by computing alone, of which two cores could do no better than half. Amplitudes
+    share a batch, and so little is left that a second process would not help."""
     args = [
         sys.executable,
         "-m",
@@ -279,8 +286,9 @@ MOTOR = '<velocity joint="j{}" kv="0.05" ctrlrange="-20 20"/>'
 
 
 def test_sand_under_a_hexapod():
-    """Steps and elements a second on one core: MuJoCo alone, the compiled callback, the same elements by NumPy, and 64 robots
-    in a Batch on all cores; a line each for README."""
+    """Steps and elements a second on one core: MuJoCo alone, the compiled callback, the
+    same elements by NumPy, and 64 robots in a Batch on all cores; a line each for
+    README."""
     mujoco = pytest.importorskip("mujoco")
     from rft import mujoco as sands
     from rft.balance.backend import preferring
@@ -353,8 +361,9 @@ def test_sand_under_a_hexapod():
 
 
 def test_a_step_in_sand_over_one_without():
-    """Of the hexapod that walks and of a quadruped that stands, at 2 ms, by elements of the geoms' own shapes: a step in sand
-    over one in nothing, NumPy over compiled code, and 64 in a Batch over one after the other."""
+    """Of the hexapod that walks and of a quadruped that stands, at 2 ms, by elements of
+    the geoms' own shapes: a step in sand over one in nothing, NumPy over compiled code,
+    and 64 in a Batch over one after the other."""
     mujoco = pytest.importorskip("mujoco")
     from test_sand_steps import STANCE, quadruped, stand
 
@@ -421,7 +430,8 @@ def test_a_step_in_sand_over_one_without():
 
 
 def _of_a_batch(sand, model, start):
-    """Wall-clock time of steps one after the other, over that of the same steps of 64 in a Batch."""
+    """Wall-clock time of steps one after the other, over that of the same steps of 64
+    in a Batch."""
     import mujoco
 
     data = mujoco.MjData(model)

@@ -1,4 +1,5 @@
-"""Stated limits of parameters, taken at the limit, refused next to it; and stated defaults."""
+"""Stated limits of parameters, taken at the limit, refused next to it; and stated
+defaults."""
 
 import dataclasses
 import functools
@@ -70,7 +71,8 @@ MASS = {"mass": 1e-9, "frequency": 1e-3, "length": 1e-3, "drag": 1e3}
 ROBOT = functools.partial(Rhex, 0.15, 0.13, 0.03, 0.05, CLeg(0.02, 0.01))
 LEAST, NEXT_TO_RIGHT = math.ulp(0.0), math.nextafter(math.pi / 2, 0)
 NUMBERS = [
-    # what, made of the number, the least and the largest that is taken; None: tested elsewhere
+    # what, made of the number, the least and the largest that is taken; None: tested
+    # elsewhere
     ("chain length", having(Chain, "length"), 1e-15, 1e15),
     ("waves", having(Serpenoid, "waves", elements=24), LEAST, 6.0),
     ("C", having(Granular, "C", gamma0=0.2), 0.0, 1e6),
@@ -216,31 +218,30 @@ COUNTS = [
 ]
 
 
-@pytest.mark.parametrize(
-    ("make", "least", "most"), [pytest.param(*row[1:], id=row[0]) for row in NUMBERS]
-)
-def test_numbers(make, least, most):
-    for last, towards in ((least, -math.inf), (most, math.inf)):
-        if last is not None:
-            make(last)
-            with pytest.raises(ValueError):  # noqa: PT011 (what it says is tested elsewhere)
-                make(math.nextafter(last, towards))
+def ends(rows, below, above):
+    """Yield what is made, its last number and the next one, at both ends of each
+    row."""
+    for name, make, least, most in rows:
+        yield pytest.param(make, least, below(least), id=f"{name}, least")
+        if most is not None:
+            yield pytest.param(make, most, above(most), id=f"{name}, most")
 
 
-@pytest.mark.parametrize(
-    ("make", "least", "most"), [pytest.param(*row[1:], id=row[0]) for row in COUNTS]
-)
-def test_counts(make, least, most):
-    for last, beyond in ((least, least - 1), (most, (most or 0) + 1)):
-        if last is not None:
-            make(last)
-            with pytest.raises(ValueError):  # noqa: PT011
-                make(beyond)
+LIMITS = [
+    *ends(
+        NUMBERS,
+        below=lambda x: math.nextafter(x, -math.inf),
+        above=lambda x: math.nextafter(x, math.inf),
+    ),
+    *ends(COUNTS, below=lambda n: n - 1, above=lambda n: n + 1),
+]
 
 
-def test_degrees_are_whole():
-    with pytest.raises(ValueError, match="degree"):
-        connection.fit(still, (np.arange(9.0),), degree=2.5)
+@pytest.mark.parametrize(("make", "taken", "refused"), LIMITS)
+def test_a_number_is_taken_at_its_limit_and_refused_next_to_it(make, taken, refused):
+    make(taken)
+    with pytest.raises(ValueError):  # noqa: PT011 (other tests see what it says)
+        make(refused)
 
 
 @pytest.mark.parametrize(
@@ -276,15 +277,15 @@ def test_limits_of_what_follows_from_numbers(make, taken, refused):
         make(refused)
 
 
+@pytest.mark.parametrize(
+    "bad",
+    [{"amplitude": math.nan}, {"centre": (1.0,)}, {"centre": (math.inf, 0.0)}],
+    ids=["amplitude", "joints", "centre"],
+)
 @pytest.mark.parametrize("gait", [*GAITS.values(), Sine()], ids=[*GAITS, "sine"])
-def test_every_gait_has_one_centre_and_one_amplitude(gait):
-    for bad in (
-        {"amplitude": math.nan},
-        {"centre": (1.0,)},
-        {"centre": (math.inf, 0.0)},
-    ):
-        with pytest.raises(ValueError, match="amplitude|centre"):
-            dataclasses.replace(gait, **bad)
+def test_every_gait_has_one_centre_and_one_amplitude(gait, bad):
+    with pytest.raises(ValueError, match="amplitude|centre"):
+        dataclasses.replace(gait, **bad)
 
 
 @pytest.mark.parametrize("highest", [-1, 0, 2, 4])
@@ -293,40 +294,37 @@ def test_harmonics_are_odd(highest):
         harmonics.fit(still, connection.grid(2, 4), 12, highest=highest)
 
 
-def test_a_frame_of_another_body_is_refused():
-    for kind in (ConstantCurvature, lambda elements: Serpenoid(elements, waves=0.1)):
-        with pytest.raises(ValueError, match="elements must"):
-            kind(elements=2)
-    for sections in (5, 24):
-        with pytest.raises(ValueError, match="sections must"):
-            ConstantCurvature(elements=12, sections=sections)
-    with pytest.raises(ValueError, match="'link-9', got 'link-10'"):
-        Backbone(elements=9).frame_pose("link-10", np.zeros(8), np.zeros(8))
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: connection.fit(still, (np.arange(9.0),), degree=2.5), "degree"),
+        (lambda: ConstantCurvature(elements=2), "elements must"),
+        (lambda: Serpenoid(2, waves=0.1), "elements must"),
+        (lambda: ConstantCurvature(elements=12, sections=5), "sections must"),
+        (lambda: ConstantCurvature(elements=12, sections=24), "sections must"),
+        (
+            lambda: Backbone(9).frame_pose("link-10", np.zeros(8), np.zeros(8)),
+            "'link-9', got 'link-10'",
+        ),
+    ],
+)
+def test_counts_of_a_body_are_whole_and_fit_each_other(make, said):
+    with pytest.raises(ValueError, match=said):
+        make()
 
 
-def test_what_is_left_out_is_what_the_documentation_says():
-    """Defaults, told apart by what they do, not by what they are called."""
-    np.testing.assert_allclose(
-        Ellipse().shape([0, math.pi / 2]), [[1, 0], [0, 0.5]], atol=1e-15
-    )
-    np.testing.assert_allclose(Circle().shape([0, math.pi / 2]), np.eye(2), atol=1e-15)
-    assert Sine() == Sine(amplitude=0.2, waves=1.0, elements=100, reverse=False)
-    assert Chain() == Chain((1.0, 1.0, 1.0), None, "mean")
-    assert Serpenoid() == Serpenoid(100, None, "mean", 1.0)
-    assert ConstantCurvature() == ConstantCurvature(100, None, "mean", 2)
-    assert Viscous() == Viscous(2.0)
-    assert SkinFriction() == SkinFriction(0.109, 0.137, 0.15)
-    assert EndCaps(0.1) == EndCaps(0.1, head=1.0, tail=1.0)
-    assert GrainInertia(**GRAINS) == GrainInertia(**GRAINS, strength=1.0)
-    assert DepthProfile() == DepthProfile((1.0, 1.0), 0.0, 0.0)
-    for medium, counts in ((Viscous(), [8, 12, 16]), (Granular(1.8, 0.2), [8, 48, 64])):
-        systems = [Swimmer(medium, Chain((1.0,) * links)) for links in (3, 4, 5)]
-        assert [fitted.directions(system, Numerics()) for system in systems] == counts
+@pytest.mark.parametrize(
+    ("medium", "counts"),
+    [(Viscous(), [8, 12, 16]), (Granular(1.8, 0.2), [8, 48, 64])],
+)
+def test_fits_take_more_directions_of_more_joints(medium, counts):
+    systems = [Swimmer(medium, Chain((1.0,) * links)) for links in (3, 4, 5)]
+    assert [fitted.directions(system, Numerics()) for system in systems] == counts
+
+
+def test_a_field_is_of_31_by_31_shapes_by_default():
     axes = connection.grid(2)
-    assert (
-        len(axes) == 2
-        and [(len(a), a[0], a[-1]) for a in axes] == [(31, -2.5, 2.5)] * 2
-    )
+    assert [(len(a), a[0], a[-1]) for a in axes] == [(31, -2.5, 2.5)] * 2
 
 
 @pytest.mark.parametrize(
@@ -348,9 +346,6 @@ def test_velocities_asked_for_by_default(ask, shapes, each):
         asked.append(np.broadcast_shapes(alpha.shape, alphadot.shape)[:-1])
         return still(alpha, alphadot)
 
-    found = ask(counted)
+    ask(counted)
     assert sum(math.prod(shape[:-1]) for shape in asked) == shapes
     assert {shape[-1] for shape in asked} == {each}
-    if isinstance(found, harmonics.Harmonics):
-        assert found.highest == 9
-    assert getattr(found, "degree", 3) == 3

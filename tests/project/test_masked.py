@@ -1,4 +1,5 @@
-"""Masked arrays: NumPy's `asarray` drops the mask, and computes with what lies under it."""
+"""Masked arrays: NumPy's `asarray` drops the mask, and computes with what lies under
+it."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,5 @@
-"""Parts of one's own: one of each family in a folder, one file and one decorator each, used by commands and from Python."""
+"""Parts of one's own: one of each family in a folder, one file and one decorator each,
+used by commands and from Python."""
 
 import json
 import pathlib
@@ -13,13 +14,10 @@ from tabled import tabled, tabled_json
 
 import geomech as library
 from geomech import plots
-from geomech.core.errors import VelocityWarning
-from geomech.io import tables
-from geomech.mathematics.gaits import Circle, Ellipse
+from geomech.mathematics.gaits import Circle
 from geomech.mathematics.geometry.traits import Traits
 from geomech.mathematics.systems.base import Cycle, integrated
 from geomech.scenes import Numerics, Scene, kinds, parse
-from geomech.shell.describe.scene import description
 from geomech.studies.mechanics.single import diagnosed_velocity
 from geomech.studies.optimisation import optimise
 from geomech.studies.scene_tables import SceneTables
@@ -147,106 +145,66 @@ SWIMMER = (
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch, own_parts):
-    """One of each in a folder."""
+    """A folder with one part of each family, and scenes of them."""
     for name, text in FILES.items():
         (tmp_path / f"own_{name}.py").write_text(HEAD + text)
-    end = '[gait]\nkind = "egg"\namplitude = 0.4\n[numerics]\ngrid = 7\nextent = 1.5\nphases = 32\n'
-    (tmp_path / "swims.toml").write_text(SWIMMER + end)
-    for kind in ("trike", "skate"):
-        (tmp_path / f"{kind}.toml").write_text(f'[system]\nkind = "{kind}"\n{end}')
+    for name, text in SCENES.items():
+        (tmp_path / f"{name}.toml").write_text(text + END)
     axis = np.linspace(-2, 2, 9)
     A = np.zeros((3, 2, 9, 9))
     A[0, 1] = np.sin(axis)[:, None]
-    (tmp_path / "own.json").write_text(
-        json.dumps({"axes": [axis.tolist()] * 2, "A": A.tolist()})
-    )
-    (tmp_path / "table.toml").write_text(
-        f'[system]\nkind = "table"\nfile = "own.json"\n{end}'
-    )
+    field = {"axes": [axis.tolist()] * 2, "A": A.tolist()}
+    (tmp_path / "own.json").write_text(json.dumps(field))
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+SCENES = {
+    "swims": SWIMMER,
+    "trike": '[system]\nkind = "trike"\n',
+    "skate": '[system]\nkind = "skate"\n',
+    "table": '[system]\nkind = "table"\nfile = "own.json"\n',
+}
+
+
+END = '[gait]\nkind = "egg"\namplitude = 0.4\n'
+
+
+END += "[numerics]\ngrid = 7\nextent = 1.5\nphases = 32\n"
+
+
+TIERS = ["--amplitudes", "0.2,0.4", "--tiers", "leading,path,direct"]
 
 
 PLUGINS = [word for name in FILES for word in ("--plugin", f"own_{name}.py")]
 
 
-@pytest.mark.parametrize("name", ["swims", "trike", "skate", "table"])
+@pytest.mark.parametrize("name", SCENES)
 def test_commands_use_one_of_each(name):
-    argv = [
-        "displacement",
-        f"{name}.toml",
-        "--amplitudes",
-        "0.2,0.4",
-        "--tiers",
-        "leading,path,direct",
-        "--json",
-    ]
-    code, _, err = geomech(*argv)
+    ask = ["displacement", f"{name}.toml", *TIERS, "--json"]
+    code, _, err = geomech(*ask)
     assert code == 2 and "unknown" in err  # a scene alone runs no code
-    code, out, err = geomech(*argv, *PLUGINS)
+    code, out, err = geomech(*ask, *PLUGINS)
     assert code == 0, err
-    found = tabled_json(out)
-    assert np.isfinite([found["leading"], found["direct"]]).all()
-    if name == "swims":
-        code, out, err = geomech(
-            "ccf", f"{name}.toml", "--style", "dots", "--plot", "ccf.png", *PLUGINS
-        )
-        assert code == 0, err
+    table = tabled_json(out)
+    assert np.isfinite([table["leading"], table["direct"]]).all()
     code, out, err = geomech("explain", f"{name}.toml", *PLUGINS)
     assert code == 0 and "egg gait" in out, err
 
 
+def test_a_map_is_drawn_in_a_style_of_ones_own():
+    ask = ["ccf", "swims.toml", "--style", "dots", "--plot", "ccf.png"]
+    assert geomech(*ask, *PLUGINS)[0] == 0
+
+
 def test_a_connection_is_written_in_a_format_of_ones_own(folder):
-    """With its settings and its limits; without the plug-in the endings that there are."""
-    argv = ["connection", "trike.toml", "-o", "made.json"]
-    assert (
-        "--sign is for a .mat file" in geomech(*argv, "--sign", "-", *PLUGINS[:-2])[2]
-    )
-    assert geomech(*argv, "--sign", "-", *PLUGINS)[0] == 0
-    written, wanted = (
-        json.loads((folder / "made.json").read_text()),
-        SceneTables(library.load("trike.toml")).fitted,
-    )
-    np.testing.assert_array_equal(written["A"], -wanted.A)
-    np.testing.assert_array_equal(written["axes"], wanted.axes)
-    assert (
-        "--order is that of a .mat file: drop it, a .json"
-        in geomech(*argv, "--order", "ndgrid", *PLUGINS)[2]
-    )
-    body = '[medium]\nlaw = "viscous"\n[body]\nkind = "chain"\nlengths = [1, 1, 1, 1]\n[gait]\nkind = "wave"\njoints = 3\n'
-    (folder / "four.toml").write_text(body)
-    code, _, err = geomech("connection", "four.toml", "-o", "four.json", *PLUGINS)
-    assert (
-        code == 2
-        and "a .json file has a layout of 2 joints, and this body has 3: write a .nc file"
-        in err
-    )
-
-
-def test_what_was_loaded_is_in_its_registry_and_in_scenes(folder):
-    for name in FILES:
-        assert kinds.load_file(folder / f"own_{name}.py")
-    for group, name in (
-        ("media", "treacle"), ("bodies", "knee"), ("effects", "waxed"), ("gaits", "egg"), ("systems", "trike"),
-        ("systems", "skate"), ("tiers", "leading"), ("ccf_styles", "dots"), ("formats", ".json"),
-    ):  # fmt: skip
-        registry = REGISTRIES[f"geomech.{group}"]
-        assert name in registry and name not in registry.built_in
-    for name in ("swims", "trike", "skate"):
-        scene = library.load(folder / f"{name}.toml")
-        again = library.toml(
-            scene.changed(text="", numerics=Numerics(grid=8, phases=32))
-        )
-        assert library.toml(parse(again)) == again
-        study = SceneTables(scene)
-        assert (
-            np.isfinite(tabled(study.displacements([0.3]))["direct"]).all()
-            and "leading" in study.tiers
-        )
-    assert (
-        library.load(folder / "skate.toml").changed(grip=0.7).system.wrapped.grip == 0.7
-    )
-    assert tables.load(folder / "own.json").length == 0.5
+    ask = ["connection", "trike.toml", "-o", "made.json", "--sign", "-"]
+    assert "--sign is for a .mat file" in geomech(*ask, *PLUGINS[:-2])[2]
+    assert geomech(*ask, *PLUGINS)[0] == 0
+    written = json.loads((folder / "made.json").read_text())
+    fitted = SceneTables(library.load("trike.toml")).fitted
+    np.testing.assert_array_equal(written["A"], -fitted.A)
+    np.testing.assert_array_equal(written["axes"], fitted.axes)
 
 
 class Cart:
@@ -273,14 +231,27 @@ def sled(alpha, alphadot):
     return Cart().velocity(alpha, alphadot)
 
 
+@pytest.mark.parametrize("name", SCENES)
+def test_a_scene_of_parts_of_ones_own_is_written_and_read_again(name, folder):
+    for part in FILES:
+        assert kinds.load_file(folder / f"own_{part}.py")
+    scene = library.load(folder / f"{name}.toml")
+    numerics = Numerics(grid=8, phases=32)
+    again = library.toml(scene.changed(text="", numerics=numerics))
+    assert library.toml(parse(again)) == again
+
+
+def test_a_number_of_a_registered_function_is_one_of_the_scene(folder):
+    for name in ("gait", "function"):
+        kinds.load_file(folder / f"own_{name}.py")
+    assert library.load("skate.toml").changed(grip=0.7).system.wrapped.grip == 0.7
+
+
 @pytest.mark.parametrize("system", [Cart(), sled])
 def test_five_members_and_functions_go_through_everything(system, tmp_path):
-    """Study, every tier, errors, frames, the optimiser, plots and words; no base class and no name."""
-    scene = Scene(
-        system,
-        Circle(amplitude=0.5, centre=(0.1, 0.2)),
-        Numerics(grid=7, extent=1.5, phases=32),
-    )
+    """No base class and no name are needed."""
+    gait = Circle(amplitude=0.5, centre=(0.1, 0.2))
+    scene = Scene(system, gait, Numerics(grid=7, extent=1.5, phases=32))
     study = SceneTables(scene)
     assert study.tiers[-1] == "direct" and {"area", "adapted", "path"} <= {*study.tiers}
     result = study.displacements([0.3, 0.5], study.tiers)
@@ -288,36 +259,21 @@ def test_five_members_and_functions_go_through_everything(system, tmp_path):
     truth = np.array(table["direct"])
     assert np.abs(truth[:, 0]).min() > 0.01
     for tier in study.tiers:
-        found = np.hypot(*(np.array(table[tier]) - truth).T[:2])
-        assert (found <= 1e-9 + np.array(table["estimate"][tier])).all(), tier
+        distance = np.hypot(*(np.array(table[tier]) - truth).T[:2])
+        assert (distance <= 1e-9 + np.array(table["estimate"][tier])).all(), tier
     framed = study.in_frame("minimum-perturbation")
     assert framed.poses("direct", None, [0.5]).shape == (1, 3)
-    with pytest.raises(Refusal, match="has one frame, 'mean'"):
-        study.in_frame("link-1")
-    found = optimise(scene, harmonics=1, limits=1.2)
-    assert found.value > np.hypot(*truth[-1, :2])
+    best = optimise(scene, harmonics=1, limits=1.2)
+    assert best.value > np.hypot(*truth[-1, :2])
     plots.save(plots.displacement_figure({"circle": result}), tmp_path / "a.png")
-    plots.save(plots.ccf_figure(study.curvature), tmp_path / "b.png")
     assert diagnosed_velocity(scene.system, [0.1, 0.2], [1.0, 0.0])["status"] == "exact"
-    assert description(scene).startswith(
-        f"scene: {getattr(system, '__name__', 'Cart')}, circle gait"
-    )
     assert study.cost([0.3], study.tiers).balances > 0
 
 
-def test_a_function_says_what_it_does_not_take():
-    with pytest.raises(
-        Refusal, match=r"the velocity of <lambda> must take \(alpha, alphadot\)"
-    ):
+def test_a_function_takes_shapes_and_their_rates():
+    said = r"the velocity of <lambda> must take \(alpha, alphadot\)"
+    with pytest.raises(Refusal, match=said):
         Scene(lambda alpha: alpha, Circle())
-    with pytest.warns(VelocityWarning, match="not odd"):
-        _ = SceneTables(
-            Scene(lambda a, u: sled(a, u) + 0.1, Circle(), Numerics(grid=7, extent=1.5))
-        ).fitted
-    one = lambda a, u: [a[0] * u[1], 0.0, u[0]]  # of a single shape
-    many = lambda a, u: np.stack([a[..., 0] * u[..., 1], 0 * u[..., 0], u[..., 0]], -1)
-    nets = [Scene(f, Ellipse(), Numerics(phases=16)).cycle().net for f in (one, many)]
-    np.testing.assert_allclose(*nets, rtol=1e-14)
 
 
 GROUPS = [
@@ -339,13 +295,6 @@ def test_every_file_of_a_folder_is_registered(group):
     assert len(registry) == len(registry.built_in) > 1
     assert {*registry} == {getattr(part, registry.key) for part in registry.values()}
     assert all(registry.admits(part) for part in registry.values())
-
-
-def test_a_style_that_a_package_offers_says_what_it_draws():
-    some = lambda: None
-    some.draws = "ccf"
-    assert plots.CCF_STYLES.admits(some) and not plots.CONNECTION_STYLES.admits(some)
-    assert not plots.CCF_STYLES.admits(lambda: None)
 
 
 ADDED = {
@@ -441,7 +390,8 @@ assert far > 0 and abs(np.log10(far / near) - order) < 0.1
 
 
 def test_a_file_in_its_folder_is_found_and_held_to_the_laws_of_its_family(tmp_path):
-    """A law, a body, an effect with a past and one on the ground; the registry of the tests has them without a line more."""
+    """A law, a body, an effect with a past and one on the ground; the registry of the
+    tests has them without a line more."""
     root = pathlib.Path(__file__).parents[2]
     shutil.copytree(root / "rft", tmp_path / "rft")
     (tmp_path / "geomech").symlink_to(root / "geomech")

@@ -1,8 +1,10 @@
-"""The import rules: rft knows nothing of geomech; of rft the pure geometry knows planar motions alone."""
+"""The import rules: rft knows nothing of geomech; of rft the pure geometry knows planar
+motions alone."""
 
 import ast
 import functools
 import graphlib
+import itertools
 import pathlib
 import re
 import tomllib
@@ -13,14 +15,13 @@ import pytest
 from geomech.shell import describe
 
 ROOT = pathlib.Path(__file__).parents[2]
-# Beside the systems: commands list the named media and ask a stress map, an intruder scene has a law, a body and effects but no
-# system, a sweep puts effects side by side, a calibration fits a law, a class of one's own is told to be an effect, and the
-# top shows media, bodies and effects to type checkers. A robot that walks has a map and no system, either; a map
-# of stress is written by its coefficients. Workers tell the
-# solver to take one thread, and by which back end. Environments for learning stand on sand, and
-# measured midlines are put into a medium.
+# Beside the systems: commands list the named media and ask a stress map; an intruder
+# has a law, a body and effects but no system; a sweep puts effects side by side; a
+# calibration fits a law; a robot that walks has a map and no system, and a map of
+# stress is written by its coefficients. Workers tell the solver to take one thread, and
+# by which back end. Environments for learning stand on sand, and measured midlines are
+# put into a medium.
 KNOW_MECHANICS = {
-    "__init__.py",
     "gym/hexapod.py",
     "run/backend.py",
     "scenes/terradynamics/intruder.py",
@@ -49,86 +50,61 @@ def nodes(path):
     return [*ast.walk(ast.parse(path.read_text()))]
 
 
-@functools.cache
-def imports(path):
-    """Dotted names of all that a file imports, wherever in it."""
-    found = []
-    for node in nodes(path):
-        if isinstance(node, ast.Import):
-            found += [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            found += [f"{node.module}.{alias.name}" for alias in node.names]
-    return found
-
-
-def test_rft_does_not_import_geomech():
-    files = list((ROOT / "rft").rglob("*.py"))
-    assert len(files) > 8
-    assert [
-        p.name
-        for p in files
-        if {"geomech", "figures"} & {x.partition(".")[0] for x in imports(p)}
-    ] == []
-
-
+# Of rft the mathematics of a connection knows errors and planar motions alone.
 ABSTRACT = ("rft.core", "rft.formulas.se2")
 
 
-def test_pure_geometry_knows_planar_motions_alone():
-    folder = ROOT / "geomech"
-    users = {
-        p.relative_to(folder).as_posix()
-        for p in folder.rglob("*.py")
-        if any(
-            x.partition(".")[0] == "rft" and not x.startswith(ABSTRACT)
-            for x in imports(p)
-        )
-    }
-    assert {
-        x for x in users if not x.startswith("mathematics/systems/")
-    } == KNOW_MECHANICS
+def test_pure_geometry_knows_planar_motions_alone(imported):
+    users = set()
+    for name, others in imported.items():
+        mechanics = {x for x in others if x.startswith("rft")}
+        if name.startswith("geomech") and any(is_mechanics(x) for x in mechanics):
+            users.add(FILES[name].relative_to(ROOT / "geomech").as_posix())
+    others = {x for x in users if not x.startswith("mathematics/systems/")}
+    assert others == KNOW_MECHANICS
+
+
+def is_mechanics(module):
+    return not module.startswith(ABSTRACT)
 
 
 def modules():
-    """Files of all modules by their dotted names."""
-    names = lambda p: ".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(
-        ".__init__"
-    )
-    return {
-        names(p): p
-        for top in ("rft", "geomech", "figures")
-        for p in (ROOT / top).rglob("*.py")
-    }
+    """Return the files of all modules by their dotted names."""
+    found = {}
+    for top in ("rft", "geomech", "figures"):
+        for path in (ROOT / top).rglob("*.py"):
+            name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+            found[name.removesuffix(".__init__")] = path
+    return found
+
+
+def names_imported(node):
+    """Return dotted names that a node of a syntax tree imports."""
+    match node:
+        case ast.Import(names=names):
+            return [alias.name for alias in names]
+        case ast.ImportFrom(module=module, names=names):
+            return [f"{module}.{alias.name}" for alias in names]
+        case ast.Call(
+            func=ast.Name("import_module") | ast.Attribute(_, "import_module")
+        ):
+            return [x.value for x in node.args if isinstance(x, ast.Constant)]
+    return []
 
 
 def arrows(path, known):
-    """Modules that a file imports, inside functions too, but for type checkers alone."""
-
-    checked = (
-        node
-        for node in nodes(path)
-        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
-    )
-    unloaded, found = {id(node) for one in checked for node in ast.walk(one)}, set()
+    """Return the modules that a file imports, inside functions too, but not those that
+    type checkers alone load."""
+    unloaded = set()
+    found = set()
     for node in nodes(path):
-        names = (
-            [alias.name for alias in node.names]
-            if isinstance(node, ast.Import | ast.ImportFrom)
-            else []
-        )
-        if isinstance(node, ast.ImportFrom):
-            names = [f"{node.module}.{name}" for name in names]
-        elif isinstance(node, ast.Call) and "import_module" in (
-            getattr(node.func, "id", ""),
-            getattr(node.func, "attr", ""),
-        ):
-            names = [x.value for x in node.args if isinstance(x, ast.Constant)]
-        if names and id(node) not in unloaded:
-            found |= {
-                next((m for m in (name, name.rpartition(".")[0]) if m in known), None)
-                for name in names
-            }
-    return found - {None}
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            unloaded |= {id(inner) for inner in ast.walk(node)}
+    for node in nodes(path):
+        if id(node) not in unloaded:
+            names = names_imported(node)
+            found |= {x if x in known else x.rpartition(".")[0] for x in names}
+    return found & {*known}
 
 
 FILES = modules()
@@ -141,7 +117,8 @@ def imported():
 
 
 def test_imports_make_no_circle(imported):
-    """Counting what is imported by name; that a package loads before its modules is Python's affair."""
+    """Counting what is imported by name; that a package loads before its modules is
+    Python's affair."""
     assert sum(map(len, imported.values())) > 800
     graphlib.TopologicalSorter(imported).prepare()
 
@@ -150,81 +127,30 @@ LAYERS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["layers"][
 
 
 def layer(module):
-    """The row of the longest name that a module's begins with."""
-    held = lambda prefix: f"{module}.".startswith(f"{prefix}.")
-    return max(
-        (len(prefix), k)
-        for k, row in enumerate(LAYERS)
-        for prefix in row
-        if held(prefix)
-    )[1]
+    """Return the row of the longest name with which a module's begins."""
+    lengths = []
+    for k, row in enumerate(LAYERS):
+        for prefix in row:
+            if f"{module}.".startswith(f"{prefix}."):
+                lengths.append((len(prefix), k))
+    return max(lengths)[1]
 
 
 def test_modules_import_from_their_own_layer_or_a_lower_one(imported):
-    upward = [
-        f"{a} imports {b}"
-        for a, some in imported.items()
-        for b in some
-        if layer(b) > layer(a)
-    ]
-    assert upward == []
-    folders = {
-        name
-        for name in FILES
-        if name.count(".") == 1 and FILES[name].name == "__init__.py"
-    }
-    assert {name for name in folders if layer(name) == len(LAYERS) - 1} == {
-        "geomech.shell",
-        "figures.accuracy",
-        "figures.grains",
-        "figures.paper",
-        "figures.robots",
-        "figures.swimmers",
-        "figures.terradynamics",
-    }
-
-
-def test_a_scene_is_a_small_class():
-    tree = ast.parse((ROOT / "geomech" / "scenes" / "model.py").read_text())
-    (scene,) = (
-        node
-        for node in tree.body
-        if isinstance(node, ast.ClassDef) and node.name == "Scene"
-    )
-    statements = [node for node in ast.walk(scene) if isinstance(node, ast.stmt)]
-    assert len(statements) < 60
+    for name, others in imported.items():
+        upward = {other for other in others if layer(other) > layer(name)}
+        assert not upward, name
 
 
 def test_what_is_said_of_mutants_is_of_files_that_exist():
-    files = [
-        p.relative_to(ROOT).as_posix()
-        for top in ("rft", "geomech")
-        for p in (ROOT / top).rglob("*.py")
-    ]
-    assert [
-        key
-        for key in mutants.TABLE["unwatched"]
-        if not any(f.startswith(key) for f in files)
-    ] == []
-    assert {
-        *mutants.TABLE["tests"],
-        *(x["file"] for x in mutants.TABLE["equivalent"]),
-    } <= {*files}
-    named = {
-        x
-        for names in (mutants.TABLE["sources"], *mutants.TABLE["tests"].values())
-        for x in names
-    }
-    files = {p.stem.removeprefix("test_") for p in (ROOT / "tests").rglob("test_*.py")}
-    assert named <= files
-
-
-def test_mutants_are_programs_that_differ():
-    made = mutants.mutants_of(ROOT / "rft" / "formulas" / "se2.py")
-    assert len(made) > 100
-    for m in made:
-        assert ast.dump(ast.parse(m.mutated)) != ast.dump(ast.parse(m.source))
-        assert m.change().startswith("- ")
+    files = [path.relative_to(ROOT).as_posix() for path in FILES.values()]
+    for start in mutants.TABLE["unwatched"]:
+        assert any(file.startswith(start) for file in files), start
+    of_equivalents = {entry["file"] for entry in mutants.TABLE["equivalent"]}
+    assert {*mutants.TABLE["tests"]} | of_equivalents <= {*files}
+    named = {*itertools.chain(*mutants.TABLE["tests"].values())}
+    tests = {p.stem.removeprefix("test_") for p in ROOT.glob("tests/*/test_*.py")}
+    assert named | {*mutants.TABLE["sources"]} <= tests
 
 
 def test_a_command_that_describes_is_the_function_of_its_file():
@@ -234,34 +160,26 @@ def test_a_command_that_describes_is_the_function_of_its_file():
 
 
 SPEAK_OF_OPTIONS = (
-    "questions/shared/base.py",
-    "questions/shared/loading.py",
-    "questions/shared/texts.py",
-    "shell/",
-)  # of geomech: parts of commands alone
+    "geomech.questions.shared.base",
+    "geomech.questions.shared.loading",
+    "geomech.questions.shared.texts",
+    "geomech.shell",
+)  # parts of commands alone
 
 
 def test_what_python_reaches_names_arguments_and_no_options():
-    """A refusal marks an argument, which a command spells as its option (`geomech.shell.terminal`)."""
+    """A refusal marks an argument, which a command spells as its option
+    (`geomech.shell.terminal`)."""
     texts = []
-    for path in sorted(p for x in ("rft", "geomech") for p in (ROOT / x).rglob("*.py")):
-        if (
-            not path.relative_to(ROOT)
-            .as_posix()
-            .removeprefix("geomech/")
-            .startswith(SPEAK_OF_OPTIONS)
-        ):
-            prose = {
-                id(node.value) for node in nodes(path) if isinstance(node, ast.Expr)
-            }
-            found = (
-                n
-                for n in nodes(path)
-                if isinstance(n, ast.Constant) and isinstance(n.value, str)
-            )
-            texts += [
-                n.value
-                for n in found
-                if id(n) not in prose and re.search(r"(?<!\w)--[a-z]", n.value)
-            ]
-    assert [x for x in texts if "geomech scenes --show" not in x] == []
+    for name, path in FILES.items():
+        if name.startswith(("figures", *SPEAK_OF_OPTIONS)):
+            continue
+        prose = {id(node.value) for node in nodes(path) if isinstance(node, ast.Expr)}
+        strings = (node for node in nodes(path) if is_string(node))
+        texts += [node.value for node in strings if id(node) not in prose]
+    options = [text for text in texts if re.search(r"(?<!\w)--[a-z]", text)]
+    assert [x for x in options if "geomech scenes --show" not in x] == []
+
+
+def is_string(node):
+    return isinstance(node, ast.Constant) and isinstance(node.value, str)

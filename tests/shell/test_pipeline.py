@@ -1,4 +1,4 @@
-"""What every command does, in one order: check, cost, store, compute, write, print. Results as values, files and data sets."""
+"""Every command checks, tells its cost, computes, writes and prints, in this order."""
 
 import dataclasses
 from pathlib import Path
@@ -82,7 +82,6 @@ def test_every_command_has_one_order(asked, capsys):
     steps = ["check", "cost", "compute", "write out.csv", "write more.csv"]
     assert question.told == steps
     assert "speed (m/s), by phase" in capsys.readouterr().out
-    assert sorted(p.name for p in Path().iterdir()) == ["more.csv", "out.csv"]
     assert Path("out.csv").read_text() == "phase\n0.0\n1.5\n3.0\n"
 
 
@@ -94,35 +93,29 @@ def test_what_is_refused_ends_there_and_leaves_nothing(fails, asked):
     assert question.told[-1] == fails and list(Path().iterdir()) == []
 
 
-def test_too_much_takes_yes_beforehand_and_on_the_way(asked):
-    for seconds, last in ((100.0, "cost"), (10.0, "compute")):
-        question = asked(seconds=seconds)
-        with pytest.raises(Refusal, match="say yes, or ask for less"):
-            pipeline.execute(question, [output(question)])
-        assert question.told[-1] == last
-        pipeline.execute(question, [output(question)], yes=True)
+@pytest.mark.parametrize(("seconds", "last"), [(100.0, "cost"), (10.0, "compute")])
+def test_too_much_takes_yes_beforehand_and_on_the_way(seconds, last, asked):
+    question = asked(seconds=seconds)
+    with pytest.raises(Refusal, match="say yes, or ask for less"):
+        pipeline.execute(question, [output(question)])
+    assert question.told[-1] == last
+    pipeline.execute(question, [output(question)], yes=True)
 
 
-def test_outputs_are_refused_before_computing(asked):
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (["no/out.csv"], "cannot write no/out.csv"),
+        (["s.toml"], "it is an input"),
+        (["out.csv", "out.csv"], "twice"),
+    ],
+)
+def test_outputs_are_refused_before_computing(names, said, asked):
     Path("s.toml").write_text(scenes.load("three-link-viscous").text)
-    for names, said in (
-        (("no/out.csv",), "cannot write no/out.csv"),
-        (("s.toml",), "it is an input"),
-        (("out.csv", "out.csv"), "twice"),
-    ):
-        question = asked()
-        question = dataclasses.replace(question, scene=scenes.load("s.toml"))
-        with pytest.raises(Refusal, match=said):
-            pipeline.execute(question, [output(question, name) for name in names])
-        assert "cost" not in question.told
-
-
-def test_a_result_is_a_mapping_of_variables():
-    assert list(RESULT) == ["phase", "tier", "speed"] and len(RESULT) == 3
-    assert RESULT["speed"] is SPEED
-    assert RESULT.sizes == {"phase": 3, "tier": 2} and "pace" not in RESULT
-    assert PHASE.is_coordinate and TIER.is_text
-    assert not SPEED.is_coordinate and not PHASE.is_text
+    question = dataclasses.replace(asked(), scene=scenes.load("s.toml"))
+    with pytest.raises(Refusal, match=said):
+        pipeline.execute(question, [output(question, name) for name in names])
+    assert "cost" not in question.told
 
 
 @pytest.mark.parametrize(("values", "sign"), [((1, 2, 4, 8), -1), ((8, 4, 2, 1), 1)])
@@ -131,3 +124,12 @@ def test_an_order_is_that_of_the_error_in_the_coarseness(values, sign):
     errors = values ** (sign * 3)
     assert measured_order(values, errors) == pytest.approx(3.0)
     assert np.isnan(measured_order(values, np.array([*errors[:2], 1e-14, 1e-14])))
+
+
+def test_one_file_by_two_names_is_not_two_outputs(asked):
+    Path("a.csv").write_text("")
+    Path("b.csv").symlink_to("a.csv")
+    question = asked()
+    with pytest.raises(Refusal, match="cannot write"):
+        pipeline.execute(question, [output(question, x) for x in ("a.csv", "b.csv")])
+    assert "cost" not in question.told

@@ -7,7 +7,8 @@ from geomech import plots
 
 
 def drawn(module, numbers, folder):
-    """Draw a figure of `figures` and write it to a file, which lays it out and reads its formulas."""
+    """Draw a figure of `figures` and write it to a file, which lays it out and reads
+    its formulas."""
     figure = module.draw(numbers)
     plots.save(figure, folder / "figure.png")
     return figure
@@ -20,7 +21,8 @@ def curve(ax, label):
 
 
 def curves(ax):
-    """Return the data (N, 2) of all lines of several points, in the order in which they were drawn."""
+    """Return the data (N, 2) of all lines of several points, in the order in which they
+    were drawn."""
     return [x.get_xydata() for x in ax.lines if len(x.get_xdata()) > 2]
 
 

@@ -32,7 +32,8 @@ def run(experiment, folder, progress=None):
 
 
 def towed(experiment):
-    """Return the run of a rod that obeys the law, with 5 % more drag in the fifth bed."""
+    """Return the run of a rod that obeys the law, with 5 % more drag in the fifth
+    bed."""
     tow, body = experiment.motion, experiment.body
     n, v = len(body.radius), (np.cos(tow.angle), np.sin(tow.angle))
     strength = 2.0  # N/m

@@ -1,4 +1,5 @@
-"""Commands as a user gives them: by `cli.main` in this process, or by a Python of their own."""
+"""Commands as a user gives them: by `cli.main` in this process, or by a Python of their
+own."""
 
 import contextlib
 import functools
@@ -23,13 +24,15 @@ PARSER = functools.cache(
 
 
 def unless_numpy(name, prefer=backend.prefer):
-    """Prefers a back end, but for the one that commands begin with: what the fixture `fastest` prefers remains."""
+    """Prefers a back end, but for the one that commands begin with: what the fixture
+    `fastest` prefers remains."""
     if name != "numpy":
         prefer(name)
 
 
 def geomech(*args, cwd="."):
-    """(exit code, standard output, standard error) of a command, run by `cli.main` in this process."""
+    """(exit code, standard output, standard error) of a command, run by `cli.main` in
+    this process."""
     streams = [io.TextIOWrapper(io.BytesIO(), encoding="utf-8") for _ in range(2)]
     handlers = {
         s: signal.getsignal(s) for s in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)

@@ -1,15 +1,18 @@
-"""Frozen words and files: what commands print, write and refuse, kept under data/ beside the numbers of `golden`.
+"""Frozen words and files: what commands print, write and refuse, kept under data/.
 
-    python tests/tools/golden.py --write    records these, too; entries that still hold stay as they are
+    python tests/tools/golden.py --write    records them; what still holds stays as it
+    is
 
-commands.txt has command lines with their output and what they wrote, refusals.txt what is refused and what its message
-names, keys.txt every key of a scene file, the schema, names in Python and their defaults. They are run in a copy of
-data/frozen, which has scenes, and a file of every format as the first version with this net wrote it (`FILES`): later
-ones read them.
+commands.txt has command lines with their output and what they wrote, refusals.txt what
+is refused and what its message names, keys.txt every key of a scene file, the schema,
+names in Python and their defaults. They are run in a copy of data/frozen, which has
+scenes, and a file of every format as the first version with these records wrote it:
+later ones read them.
 
-Names, numbers, keys and exit codes are fixed, wording is free (`words`): of a refusal counts what it names, and that it
-says what to do. Everything goes through the command line, files and names of `geomech`; a move of modules needs changes
-in `namespace` at most.
+Names, numbers, keys and exit codes are fixed, wording is free (`words`): of a refusal
+counts what it names, and that it says what to do. Everything goes through the command
+line, files and names of `geomech`; a move of modules needs changes in `namespace` at
+most.
 """
 
 from __future__ import annotations
@@ -25,7 +28,6 @@ import pathlib
 import re
 import shlex
 import shutil
-import sys
 import tempfile
 import warnings
 from collections.abc import Iterator
@@ -46,21 +48,10 @@ from words import (
 )
 
 DATA = pathlib.Path(__file__).parents[1] / "data"
-FOLDER, COMMANDS, REFUSALS, KEYS = (
-    DATA / "frozen",
-    DATA / "commands.txt",
-    DATA / "refusals.txt",
-    DATA / "keys.txt",
-)
-
-# The files in data/frozen that a command wrote, and which; `python tests/tools/frozen.py --files` writes them anew.
-FILES = {
-    "field.nc": "connection swim.toml --grid 5 -o field.nc",
-    "field.mat": "connection swim.toml --grid 5 -o field.mat --sign - --order meshgrid",
-    "sand.toml": "fit-medium dem-rod-drag -o sand.toml",
-    "grains.toml": "fit-medium plates.csv -o grains.toml",
-    "best.toml": "optimize three-link-viscous --objective efficiency --harmonics 1 -o best.toml",
-}
+FOLDER = DATA / "frozen"
+COMMANDS = DATA / "commands.txt"
+REFUSALS = DATA / "refusals.txt"
+KEYS = DATA / "keys.txt"
 
 
 DOORS = [
@@ -88,7 +79,8 @@ DOORS += [
 
 
 def geomech(*args: str) -> tuple[str, str, str]:
-    """(exit code, standard output, standard error) of a command in this process."""
+    """Return (exit code, standard output, standard error) of a command in this
+    process."""
     try:
         code, out, err = commands.geomech(*args)
     except Exception as fault:  # of the program, whose traceback Python prints
@@ -108,44 +100,35 @@ def place() -> Iterator[pathlib.Path]:
 
 
 def files() -> dict[pathlib.Path, int]:
-    """When each file below the folder where we are was written."""
-    paths = (
-        os.path.join(folder, name)
-        for folder, _, names in os.walk(".")
-        for name in names
-    )
-    return {pathlib.Path(p): os.stat(p).st_mtime_ns for p in paths if os.path.isfile(p)}
+    """Return when each file below the current folder was written."""
+    paths = pathlib.Path().rglob("*")
+    return {p: os.stat(p).st_mtime_ns for p in paths if os.path.isfile(p)}
 
 
 # commands.txt
 
 
+HELP = r"^  (-\S.*?|[\[{A-Z]\S*|[a-z][a-z-]*)(?: <|  |$)"  # its options and commands
+
+
 def ran(line: str) -> list[str]:
-    """A command in the folder where we are, or several with " ; " between them, and what came of it, as lines."""
+    """Return what came of a command in the current folder, or of several with " ; "
+    between them, as lines."""
     if " ; " in line:
         return [told for part in line.split(" ; ") for told in ran(part)]
     before = files()
     code, out, err = geomech(*shlex.split(line))
-    told = []
     if line.endswith("--help"):
-        told += [
-            f"= {x}"
-            for x in re.findall(
-                r"^  (-\S.*?|[\[{A-Z]\S*|[a-z][a-z-]*)(?: <|  |$)", out, re.M
-            )
-        ]
+        told = [f"= {x}" for x in re.findall(HELP, out, re.M)]
+    elif out.startswith("{"):
+        told = [f"= {x}" for x in flat(json.loads(out))]
     else:
-        try:
-            told += [f"= {x}" for x in flat(json.loads(out))]
-        except ValueError:
-            told += [f"| {x}" for x in masked(out).splitlines() if x.strip()]
-    told += [
-        f"! {x}" for x in masked(err).splitlines() if x.startswith(("error:", "note:"))
-    ]
-    for file in sorted(
-        file for file, time in files().items() if before.get(file) != time
-    ):
-        told += [f"> {file}", *of_file(file)]
+        told = [f"| {x}" for x in masked(out).splitlines() if x.strip()]
+    said = masked(err).splitlines()
+    told += [f"! {x}" for x in said if x.startswith(("error:", "note:"))]
+    for file, time in sorted(files().items()):
+        if before.get(file) != time:
+            told += [f"> {file}", *of_file(file)]
     return [*told, f"exit {code}"]
 
 
@@ -170,27 +153,25 @@ def read_commands() -> dict[str, list[str]]:
 
 
 def parts(lines: list[str]) -> list[str]:
-    """Lines as they count: what is printed as one text, all others by themselves."""
+    """Return lines as they count: what is printed as one text, others by themselves."""
     printed = "\n".join(line for line in lines if line.startswith("| "))
-    return [
-        *([printed] if printed else []),
-        *(line for line in lines if not line.startswith("| ")),
-    ]
+    others = [line for line in lines if not line.startswith("| ")]
+    return [printed, *others] if printed else others
 
 
 def differs(old: list[str], new: list[str]) -> str:
-    """What of a command's outcome is not as it was; "" where that is at most wording."""
-    was, now = parts(old), parts(new)
-    for a, b in itertools.zip_longest(was, now, fillvalue="nothing"):
-        if a[:1] != b[:1] or not (
-            text_holds(a, b) if a[0] in "|!~" else line_holds(a, b)
-        ):
-            return f"was {a}\nnow {b}"
+    """Return what of a command's outcome is not as it was, "" where that is at most
+    wording."""
+    for was, now in itertools.zip_longest(parts(old), parts(new), fillvalue="nothing"):
+        holds = text_holds if was[0] in "|!~" else line_holds
+        if was[:1] != now[:1] or not holds(was, now):
+            return f"was {was}\nnow {now}"
     return ""
 
 
-# refusals.txt: under [a command, and the file that is changed] what is done to that, under [geomech] whole commands, under
-# [python] expressions; each with how it ends, what its message names, and "cure" where that says what to do.
+# refusals.txt: under [a command, and the file that is changed] what is done to that,
+# under [geomech] whole commands, under [python] expressions; each with how it ends,
+# what its message names, and "cure" where that says what to do.
 
 CURE = re.compile(  # words of a cure, or of what a value must be
     r"\?$|did you mean|\b(must|such as|possible|takes?|use|give|say|add|put|write|raise|lower|widen|leave|drop|keep|choose"
@@ -218,16 +199,14 @@ ESCAPES = {"n": b"\n", "r": b"\r", "t": b"\t", "0": b"\0", "\\": b"\\"}
 
 
 def namespace() -> dict:
-    """Names that refusals from Python are written in."""
+    """Return the names that refusals from Python are written in."""
     import geomech as top
     import rft
 
     found: dict = {"np": np, "math": math, "rft": rft, "geomech": top}
     for module in (rft, top.systems, top.gaits, top.bodies, top.media, top.effects):
         found |= {name: x for name, x in vars(module).items() if isinstance(x, type)}
-    return found | {
-        name: getattr(top, name) for name in dir(top) if not name.startswith("_")
-    }
+    return found | {name: getattr(top, name) for name in public_names(top)}
 
 
 def raw(text: str) -> bytes:
@@ -243,40 +222,35 @@ def raw(text: str) -> bytes:
     )
 
 
+def public_names(module) -> list[str]:
+    return [name for name in dir(module) if not name.startswith("_")]
+
+
 def edited(content: bytes, edits: str) -> bytes:
-    """What a file holds after "old => new", the first time that old is there; "* => new" replaces all of it, " => new" is
-    added at its end, and " && " goes between several."""
+    """Return what a file holds after "old => new", the first time that old is there; "*
+    => new" replaces all of it, " => new" is added at its end, and " && " goes between
+    several."""
     for edit in edits.split(" && "):
-        old, _, new = edit.partition("=>")
-        old, new = raw(old.strip(" ")), raw(new.strip(" "))
+        old, new = (raw(side.strip(" ")) for side in edit.split("=>", 1))
         assert old == b"*" or old in content, f"{old!r} is not there to be changed"
-        content = (
-            new
-            if old == b"*"
-            else content.replace(old, new, 1)
-            if old
-            else content + new
-        )
+        if old == b"*":
+            content = new
+        elif old:
+            content = content.replace(old, new, 1)
+        else:
+            content += new
     return content
 
 
 def refused(section: str, case: str) -> tuple[str, str]:
-    """(exit code, or the error's class; the message) of a case."""
-    if section == "python":
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                eval(case, namespace())
-        except Exception as error:
-            kind = next(c for c in type(error).__mro__ if c.__module__ == "builtins")
-            return kind.__name__, str(error)
-        return "nothing", ""
+    """Return (exit code, or the error's class; the message) of a case."""
     if section == "geomech":
         return ended(case)
+    if section == "python":
+        return raised(case)
     command, _, name = section.partition(" | ")
-    file = pathlib.Path(
-        name or next(word for word in command.split() if (FOLDER / word).is_file())
-    )
+    named = (word for word in command.split() if (FOLDER / word).is_file())
+    file = pathlib.Path(name or next(named))
     before = file.read_bytes()
     try:
         file.write_bytes(edited(before, case))
@@ -285,24 +259,37 @@ def refused(section: str, case: str) -> tuple[str, str]:
         file.write_bytes(before)
 
 
+def raised(expression: str) -> tuple[str, str]:
+    """Return (the error's class, its message) of an expression."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            eval(expression, namespace())
+    except Exception as error:
+        kind = next(c for c in type(error).__mro__ if c.__module__ == "builtins")
+        return kind.__name__, str(error)
+    return "nothing", ""
+
+
 def ended(line: str) -> tuple[str, str]:
-    """(exit code, message) of a command; with the code what a refusal should not do beside its one line."""
+    """Return (exit code, message) of a command; with the code what a refusal should not
+    do beside its one line."""
     before = files()
     code, out, err = geomech(*shlex.split(line))
-    message = " ".join(x for x in masked(err).splitlines() if x.startswith("error: "))
+    lines = masked(err).splitlines()
     amiss = {
         "prints": out,
         "says more": err.count("\n") != 1,
         "says too much": len(err) > 600,
         "writes": files() != before,
     }
-    return " and ".join(
-        [code, *(what for what, found in amiss.items() if found)]
-    ), message
+    end = " and ".join([code, *(what for what, found in amiss.items() if found)])
+    return end, " ".join(x for x in lines if x.startswith("error: "))
 
 
 def named(message: str, given: str) -> list[str]:
-    """What a refusal calls by name, in its order: what `names` finds, [sections], numbers, words and keys that were given."""
+    """What a refusal calls by name, in its order: what `names` finds, [sections],
+    numbers, words and keys that were given."""
     given = given.replace("\\n", " ")
     words = {
         *re.findall(r"[A-Za-z][\w-]+", given),
@@ -338,25 +325,26 @@ def outcome(section: str, case: str) -> str:
 
 
 def still(recorded: str, section: str, case: str) -> str:
-    """What of a case is not as it was, "" for nothing: its end, a name that is named no more, a cure that is missing."""
+    """Return what of a case is not as it was, "" for nothing: its end, a name that is
+    named no more, a cure that is missing."""
     code, message = refused(section, case)
     was, _, rest = recorded.partition(" ")
     wanted, end = json.JSONDecoder().raw_decode(rest)
-    values = [x for x, _ in numbers(message)]
-    lost = [
-        name
-        for name in wanted
-        if not (
-            name in message
-            if (x := number_of(name)) is None
-            else any(math.isclose(x, y, rel_tol=TOLERANCE) for y in values)
-        )
-    ]
+    lost = [name for name in wanted if not is_named(name, message)]
     if code != was:
         return f"ends with {code} in place of {was}: {message}"
     if lost:
         return f"does not name {', '.join(lost)}: {message}"
-    return f"says no cure: {message}" if rest[end:] and not CURE.search(message) else ""
+    if rest[end:] and not CURE.search(message):
+        return f"says no cure: {message}"
+    return ""
+
+
+def is_named(name: str, message: str) -> bool:
+    number = number_of(name)
+    if number is None:
+        return name in message
+    return any(math.isclose(number, x, rel_tol=TOLERANCE) for x, _ in numbers(message))
 
 
 def read_refusals() -> dict[tuple[str, str], str]:
@@ -375,8 +363,8 @@ def read_refusals() -> dict[tuple[str, str], str]:
 
 
 def keys() -> Iterator[str]:
-    """Every key of a scene file with its type, unit and default; the schema, less its descriptions; names in Python, and
-    what is taken where an argument is left out."""
+    """Every key of a scene file with its type, unit and default; the schema, less its
+    descriptions; names in Python, and what is taken where an argument is left out."""
     import geomech as top
 
     table = ""
@@ -402,7 +390,8 @@ def keys() -> Iterator[str]:
 
 
 def defaults(module) -> Iterator[str]:
-    """The arguments with defaults of the functions, classes and methods that a module offers."""
+    """The arguments with defaults of the functions, classes and methods that a module
+    offers."""
     for name, x in (
         (name, getattr(module, name))
         for name in dir(module)
@@ -425,8 +414,9 @@ def defaults(module) -> Iterator[str]:
 
 
 def of_schema(node, path: str = "", before: dict | None = None) -> Iterator[str]:
-    """A JSON Schema without its descriptions: a line for what takes little room, else one for each of its entries, those of
-    a list by their kind where they have one. before: what was told already, and where."""
+    """A JSON Schema without its descriptions: a line for what takes little room, else
+    one for each of its entries, those of a list by their kind where they have one.
+    before: what was told already, and where."""
     text, before = compact(undescribed(node)), {} if before is None else before
     if len(text) <= 200 or not isinstance(node, (dict, list)):
         yield f"{path} {text}"
@@ -478,7 +468,8 @@ def words_of(lines: list[str]) -> list[str]:
 
 
 def write(say=print) -> None:
-    """Records all that does not hold, and new wording; what holds keeps its digits and names."""
+    """Records all that does not hold, and new wording; what holds keeps its digits and
+    names."""
     lines = [line for line in COMMANDS.read_text().splitlines() if line.startswith("#")]
     recorded = read_commands()
     for command, new in outcomes(list(recorded)).items():
@@ -507,17 +498,3 @@ def write(say=print) -> None:
         for line in sorted(some):
             say(f"{sign}: {line}")
     KEYS.write_text("\n".join(new) + "\n")
-
-
-def write_files() -> None:
-    """Writes `FILES` anew, into data/frozen."""
-    with place() as here:
-        for name, command in FILES.items():
-            code, _, err = geomech(*command.split())
-            assert code == "0", err
-            shutil.copy(here / name, FOLDER / name)
-
-
-if __name__ == "__main__":
-    if sys.argv[1:] == ["--files"]:
-        write_files()

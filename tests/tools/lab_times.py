@@ -1,4 +1,5 @@
-"""How long a frame of the gait lab takes while a point is dragged, and a step of a family. By hand, not collected by pytest:
+"""How long a frame of the gait lab takes while a point is dragged, and a step of a
+family. By hand, not collected by pytest:
 
     python tests/tools/lab_times.py
 

@@ -7,7 +7,8 @@ from rft.laws.records import record
 
 
 def as_array(load: Load, like: np.ndarray) -> np.ndarray:
-    """(3, 4, *shape): rows t, n and w; columns the value and its slopes in v_t, v_n and v_w."""
+    """(3, 4, *shape): rows t, n and w; columns the value and its slopes in v_t, v_n and
+    v_w."""
     return np.array(np.broadcast_arrays(*load, like)[:12]).reshape(
         3, 4, *np.shape(like)
     )

@@ -1,23 +1,28 @@
-"""Small bugs put into the code on purpose, to see whether a test notices. By hand, not collected by pytest:
+"""Small bugs put into the code on purpose, to see whether a test notices. By hand, not
+collected by pytest:
 
-    python tests/tools/mutants.py calls.txt --measure
-    python tests/tools/mutants.py calls.txt --count 200 --seed 1 --jobs 2 [--only rft/laws rft/bodies]
-    python tests/tools/mutants.py calls.txt --count 200 --seed 1 --map map.jsonl
-    python tests/tools/mutants.py calls.txt --needed map.jsonl
+    python tests/tools/mutants.py calls.txt --measure python tests/tools/mutants.py
+    calls.txt --count 200 --seed 1 --jobs 2 [--only rft/laws rft/bodies] python
+    tests/tools/mutants.py calls.txt --count 200 --seed 1 --map map.jsonl python
+    tests/tools/mutants.py calls.txt --needed map.jsonl
 
-The first line runs the suite and the examples of docstrings once and notes which functions each test calls, and its
-seconds. A mutant then meets the tests that call the function in which it stands (of a constant: any of its class, file
-or folder), quickest first, and as far as `ENOUGH` seconds go, the rest of their files, which may look at what a fixture
-or a cache holds. `mutants.toml` beside this file names the tests of what Python does not see called, what is left out
-and which mutants are no bugs. Mutants live in copies of the tree in the system's temporary folder, one a worker; the
-checkout is only read. A mutant is killed when a test fails; time-outs, far longer than without it, are counted apart.
-Survivors are printed as what they change.
-`--done 50` goes on with a run that was stopped after 50. `--rooms laws shell` measures the tests of these folders of
-`tests/` alone, for a change of one room.
+The first line runs the suite and the examples of docstrings once and notes which
+functions each test calls, and its seconds. A mutant then meets the tests that call the
+function in which it stands (of a constant: any of its class, file or folder), quickest
+first, and as far as `ENOUGH` seconds go, the rest of their files, which may look at
+what a fixture or a cache holds. `mutants.toml` beside this file names the tests of what
+Python does not see called, what is left out and which mutants are no bugs. Mutants live
+in copies of the tree in the system's temporary folder, one a worker; the checkout is
+only read. A mutant is killed when a test fails; time-outs, far longer than without it,
+are counted apart. Survivors are printed as what they change.
+`--done 50` goes on with a run that was stopped after 50. `--rooms laws shell` measures
+the tests of these folders of `tests/` alone, for a change of one room.
 
-`--map` lets all tests of a mutant run, not only as far as the first that fails, and adds a line for each mutant to a
-file: what it changes, and which tests notice. `--needed` reads such files and prints a set of tests that notices every
-mutant that any test noticed, cheapest first as far as a greedy choice goes, and the tests that it does without.
+`--map` lets all tests of a mutant run, not only as far as the first that fails, and
+adds a line for each mutant to a file: what it changes, and which tests notice.
+`--needed` reads such files and prints a set of tests that notices every mutant that any
+test noticed, cheapest first as far as a greedy choice goes, and the tests that it does
+without.
 """
 
 import argparse
@@ -88,7 +93,8 @@ TWIN = {
     for p in map(str.split, (PAIRS + ", argmin argmax, exp expm1").split(","))
     for i in (0, 1)
 }
-EITHER_WAY = "max min maximum minimum fmax fmin hypot distance pose_distance dot plus"  # functions of two arguments
+# functions of two arguments
+EITHER_WAY = "max min maximum minimum fmax fmin hypot distance pose_distance dot plus"
 
 
 class Mutant(NamedTuple):
@@ -164,7 +170,8 @@ def variants(node):
 
 
 def nodes(tree):
-    """The nodes of a tree that may be mutated: not texts, annotations, decorators, nor what the table says to skip."""
+    """The nodes of a tree that may be mutated: not texts, annotations, decorators, nor
+    what the table says to skip."""
     for field, value in ast.iter_fields(tree):
         for node in value if isinstance(value, list) else [value]:
             plain = isinstance(node, ast.AST) and field not in (
@@ -187,7 +194,8 @@ def nodes(tree):
 
 
 def scopes(node, name=""):
-    """(first line, last line, qualified name) of a tree and of each function and class in it, outer ones first."""
+    """(first line, last line, qualified name) of a tree and of each function and class
+    in it, outer ones first."""
     if isinstance(node, ast.Module):
         yield 0, sys.maxsize, name
     for x in ast.iter_child_nodes(node):
@@ -225,14 +233,16 @@ def mutants_of(path: Path) -> list[Mutant]:
 
 
 def outwards(place: str) -> Iterator[str]:
-    """A place (a file, a dot and a qualified name), the function or class around it, and so on to the file and folders."""
+    """A place (a file, a dot and a qualified name), the function or class around it,
+    and so on to the file and folders."""
     while place:
         yield place
         place = place.rpartition("." if ".py." in place else "/")[0]
 
 
 class Calls:
-    """A plugin of pytest that writes a line for each test: its CPU time, and the functions of the project it calls."""
+    """A plugin of pytest that writes a line for each test: its CPU time, and the
+    functions of the project it calls."""
 
     def __init__(self, tree: Path, file: Path):
         self.tree, self.file = f"{tree}/", file
@@ -304,7 +314,8 @@ class Watch:
 
 
 def file_of(test: str) -> str:
-    """The name of a test's file, as the table has it; examples of docstrings are one file."""
+    """The name of a test's file, as the table has it; examples of docstrings are one
+    file."""
     file = test.partition("::")[0]
     return (
         Path(file).stem.removeprefix("test_")
@@ -321,8 +332,8 @@ def start(
     plugins=(),
     until_end: bool = False,
 ) -> int:
-    """The id of a new process that runs some tests in a copy of the tree, with so much CPU time at most: up to the
-    first file in which one fails, or all of them."""
+    """The id of a new process that runs some tests in a copy of the tree, with so much
+    CPU time at most: up to the first file in which one fails, or all of them."""
     if child := os.fork():
         return child
     try:
@@ -369,7 +380,8 @@ class Failures:
 
 
 def needed(files: list[Path], watch: Watch) -> None:
-    """Print tests that notice all mutants of some maps together, and those that are not needed for it."""
+    """Print tests that notice all mutants of some maps together, and those that are not
+    needed for it."""
     noticed = {}
     for file in files:
         for line in file.open():
@@ -419,7 +431,8 @@ def measure(file: Path, folder: Path, rooms: list[str]) -> None:
 def hunted(
     some: list[Mutant], watch: Watch, folder: Path, jobs: int, map_file: Path | None
 ) -> Iterator[tuple[Mutant, str]]:
-    """Each with "survived", "killed" or "time-out", so many at a time, each in a copy of the tree below ``folder``."""
+    """Each with "survived", "killed" or "time-out", so many at a time, each in a copy
+    of the tree below ``folder``."""
     trees, running, todo = (
         [copied(folder / str(k)) for k in range(jobs)],
         {},

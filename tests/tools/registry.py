@@ -1,4 +1,5 @@
-"""Everything the property tests run over: the examples of all parts, and shapes, stresses and robots."""
+"""Everything the property tests run over: the examples of all parts, and shapes,
+stresses and robots."""
 
 import math
 import pathlib
@@ -133,7 +134,8 @@ ORDERS = {
 
 
 def vanishing(kinds):
-    """Return functions of x whose effects vanish as x goes to 0, with the order at which they do, by name."""
+    """Return functions of x whose effects vanish as x goes to 0, with the order at
+    which they do, by name."""
     return {
         name: (
             lambda x, kind=kind, name=name: kind.examples(x)[name],

@@ -1,4 +1,5 @@
-"""sysplotter's struct s, written as `sys_calcsystem` saves it: of the viscous three-link swimmer, by its methods."""
+"""sysplotter's struct s, written as `sys_calcsystem` saves it: of the viscous
+three-link swimmer, by its methods."""
 
 import functools
 
@@ -22,7 +23,8 @@ def cell(values, lead):
 
 
 def differences(axes, A):
-    """CCF by differences of neighbours, one-sided at the edge, as calc_ccf.m takes them: (3, 1, N, M)."""
+    """CCF by differences of neighbours, one-sided at the edge, as calc_ccf.m takes
+    them: (3, 1, N, M)."""
     dA = np.gradient(A[:, 1], axes[0], axis=1) - np.gradient(A[:, 0], axes[1], axis=2)
     return (dA + np.moveaxis(se2.bracket(*np.moveaxis(A, (1, 0), (0, -1))), -1, 0))[
         :, None
@@ -31,7 +33,8 @@ def differences(axes, A):
 
 @functools.cache
 def computed(points=15, coarse=7, extent=3.0, frame="link-2"):
-    """(fitted connection, metric on a grid of its own, A and pose of the frame in linear elements)."""
+    """(fitted connection, metric on a grid of its own, A and pose of the frame in
+    linear elements)."""
     swimmer = Swimmer(rft.Viscous(2.0), rft.Chain((1, 1, 1), frame=frame))
     fitted = connection.fit(
         swimmer.velocity, connection.grid(2, points, extent), 2, traits=swimmer.traits

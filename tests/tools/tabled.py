@@ -12,9 +12,9 @@ QUANTITIES = ("x", "y", "heading", "net_distance")
 
 
 def tabled(result):
-    """Return a result of displacements by tier: {tier: poses, "estimate": {tier: errors of
-    the position}, "estimate_heading": ..., quantity: {tier: values}, "amplitude": ...},
-    and its attributes."""
+    """Return a result of displacements by tier: {tier: poses, "estimate": {tier: errors
+    of the position}, "estimate_heading": ..., quantity: {tier: values}, "amplitude":
+    ...}, and its attributes."""
     tiers = result["tier"].values.tolist()
 
     def by_tier(values):

@@ -1,8 +1,10 @@
-"""Truths that cost more than the test they serve, kept in tests/data under what they are an answer to.
+"""Truths that cost more than the test they serve, kept in tests/data under what they
+are an answer to.
 
-A question is any nest of values that says all the answer depends on: medium, body, gait, effects, amplitudes, how fine.
-Its hash is the key, so a test that asks another question finds nothing and has it computed. `pytest --renew-truths`
-computes all of them and writes the files; what moved is then in the diff.
+A question is any nest of values that says all the answer depends on: medium, body,
+gait, effects, amplitudes, how fine. Its hash is the key, so a test that asks another
+question finds nothing and has it computed. `pytest --renew-truths` computes all of them
+and writes the files; what moved is then in the diff.
 """
 
 import dataclasses
@@ -20,7 +22,8 @@ LATER = {"covariance", "frequency", "modes", "waves"}
 
 
 def spelled(value) -> str:
-    """A question as text, alike on every machine: floats to 12 digits, dataclasses by their fields."""
+    """A question as text, alike on every machine: floats to 12 digits, dataclasses by
+    their fields."""
     match value:
         case float() | np.floating():
             return f"{value:.12g}"
@@ -44,14 +47,16 @@ def spelled(value) -> str:
 
 
 class Truths:
-    """What is kept. renew: compute every answer asked for, and let `write` replace the files by them."""
+    """What is kept. renew: compute every answer asked for, and let `write` replace the
+    files by them."""
 
     def __init__(self, renew: bool = False, folder: pathlib.Path = DATA):
         self.renew, self.folder, self.kept, self.asked = renew, folder, {}, {}
         self.missing = []  # names of files that had no answer
 
     def __call__(self, name: str, compute: Callable, *question) -> np.ndarray:
-        """The answer kept in ``name``.json for the question; ``compute(*question)`` if there is none."""
+        """The answer kept in ``name``.json for the question; ``compute(*question)`` if
+        there is none."""
         key = hashlib.sha256(spelled(question).encode()).hexdigest()[:16]
         asked = self.asked.setdefault(name, {})
         if key not in asked:

@@ -1,4 +1,5 @@
-"""A program of a user's, on which `mypy --strict` finds nothing (.ci/run) and which runs (test_top.py)."""
+"""A program of a user's, on which `mypy --strict` finds nothing (.ci/run) and which
+runs (test_top.py)."""
 
 from dataclasses import dataclass
 from typing import Any

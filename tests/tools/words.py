@@ -1,7 +1,9 @@
-"""Texts, JSON and files as lines, and whether such lines say the same: numbers to 1e-6, names, and no word beside.
+"""Texts, JSON and files as lines, and whether such lines say the same: numbers to 1e-6,
+names, and no word beside.
 
-Of a text its numbers count, in their order, and the names in it. A structure (JSON, TOML, a table, a file of numbers) is
-lines "path = value", which are the same but for the digits of their numbers. Times and facts of the machine are masked.
+Of a text its numbers count, in their order, and the names in it. A structure (JSON,
+TOML, a table, a file of numbers) is lines "path = value", which are the same but for
+the digits of their numbers. Times and facts of the machine are masked.
 """
 
 from __future__ import annotations
@@ -78,13 +80,15 @@ def masked(text: str) -> str:
 
 
 def number_of(word: str) -> float | None:
-    """A word as a number, of "+-1e-3", "30deg", "5%" and "8." the same; None if it is none."""
+    """A word as a number, of "+-1e-3", "30deg", "5%" and "8." the same; None if it is
+    none."""
     word = word.removeprefix("+-").rstrip(".%?!").removesuffix("deg")
     return float(word) if PLAIN_NUMBER.fullmatch(word) else None
 
 
 def numbers(text: str) -> list[tuple[float, float]]:
-    """Every number in a text with one unit of its last decimal, 0 if it has none, in their order."""
+    """Every number in a text with one unit of its last decimal, 0 if it has none, in
+    their order."""
     found = []
     for word in WORD.findall(text):
         if (x := number_of(word)) is not None:
@@ -97,7 +101,8 @@ def numbers(text: str) -> list[tuple[float, float]]:
 
 
 def names(text: str) -> set[str]:
-    """What a text calls by name: options, files, what stands in quotes or looks like code, units, and `LISTED`."""
+    """What a text calls by name: options, files, what stands in quotes or looks like
+    code, units, and `LISTED`."""
     words = {word.rstrip(".") for word in WORD.findall(text)} | set(
         re.findall(r"[^\s(),;:]+", text)
     )
@@ -129,15 +134,21 @@ def text_holds(old: str, new: str) -> bool:
     return same and names(old) <= names(new)
 
 
+def bare(text: str) -> str:
+    """Return a text with # in place of its numbers."""
+
+    def replaced(word):
+        return word[0] if number_of(word[0]) is None else "#"
+
+    return WORD.sub(replaced, text)
+
+
 def line_holds(old: str, new: str) -> bool:
     """Whether a line of a structure is the same but for the digits of its numbers."""
     if old == new:
         return True
     was, now = numbers(old), numbers(new)
     size = max((abs(x) for x, _ in was), default=0.0)
-    bare = lambda text: WORD.sub(
-        lambda word: "#" if number_of(word[0]) is not None else word[0], text
-    )
     return bare(old) == bare(new) and all(
         near(a, b, 0.0, size) for (a, _), (b, _) in zip(was, now)
     )
@@ -147,18 +158,12 @@ def line_holds(old: str, new: str) -> bool:
 
 
 def short(x) -> str:
-    return (
-        x
-        if isinstance(x, str)
-        else f"{x:.8g}"
-        if isinstance(x, (float, np.floating))
-        else str(x)
-    )
+    return f"{x:.8g}" if isinstance(x, (float, np.floating)) else str(x)
 
 
 def of_array(values) -> str:
-    """An array on a line: all of up to twelve numbers; of more its shape, some of them, the root mean square, and a sum with
-    alternating weights, which tells what moved."""
+    """An array on a line: all of up to twelve numbers; of more its shape, some of them,
+    the root mean square, and a sum with alternating weights, which tells what moved."""
     array = np.asarray(values)
     flat = array.ravel()
     if flat.dtype.kind not in "iufb" or flat.size <= 12:
@@ -211,9 +216,12 @@ def of_text(name: str, text: str) -> Iterator[str]:
             yield f"~ {name} = {text}"
 
 
+def decoded(x):
+    return x.decode() if isinstance(x, bytes) else x
+
+
 def of_netcdf(file: pathlib.Path) -> Iterator[str]:
     with netcdf_file(file, mmap=False) as data:
-        decoded = lambda x: x.decode() if isinstance(x, bytes) else x
         for key in sorted(data._attributes):
             yield from of_text(f":{key}", masked(short(decoded(data._attributes[key]))))
         for name in sorted(data.variables):
