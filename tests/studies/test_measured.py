@@ -69,7 +69,7 @@ def save_field(path, fit):
 
 @pytest.fixture(scope="module")
 def viscous():
-    # The velocity of an uneven swimmer, in a table that is the truth here.
+    """The velocity of an uneven swimmer, in a table that is the truth here."""
     swimmer = Swimmer(rft.Viscous(2.0), BODY)
     return connection.fit(swimmer.velocity, connection.grid(2, 15, 1.5)).velocity
 
@@ -102,7 +102,7 @@ def true_net(f, velocity):
 
 
 def true_A(f, velocity, t, h=1e-5):
-    # d xi / d alphadot at the mean gait.
+    """d xi / d alphadot at the mean gait."""
     alpha = f.taylor.loop.shape(t)
     rate = f.taylor.loop.shape(t, 1)
     rises = [
@@ -112,7 +112,7 @@ def true_A(f, velocity, t, h=1e-5):
 
 
 def refused(said):
-    # Whether a refusal with such a message is to come, or none, "", is.
+    """Whether a refusal with such a message is to come, or none, "", is."""
     if said:
         return pytest.raises(Refusal, match=said)
     return contextlib.nullcontext()
@@ -122,8 +122,8 @@ def refused(said):
 
 
 def covered(velocity, seeds, **asked):
-    # Shares of net poses (3,) of the mean gait, and of entries of A at 8 phases, that
-    # intervals of ``seeds`` logs cover.
+    """Shares of net poses (3,) of the mean gait, and of entries of A at 8 phases, that
+    intervals of ``seeds`` logs cover."""
     fits = [fitted(velocity, seed=seed, **asked) for seed in seeds]
     t = PLACES[::8]
     net = [is_covered(f.displacement, true_net(f, velocity)) for f in fits]
@@ -132,7 +132,7 @@ def covered(velocity, seeds, **asked):
 
 
 def is_covered(found, true):
-    # Whether intervals, (values, half widths), hold true values.
+    """Whether intervals, (values, half widths), hold true values."""
     values, half_widths = found
     return np.abs(values - true) <= half_widths
 
@@ -165,8 +165,8 @@ def test_half_of_the_intervals_of_one_half_miss(viscous, usual):
 def wandering(
     velocity, gait, cycles=60, samples=60, spread=0.05, noise=1e-3, seed=0, finer=4
 ):
-    # A log made in another way than those of `synthetic`: offsets and first harmonics
-    # of the joints wander from cycle to cycle, as does the pace.
+    """A log made in another way than those of `synthetic`: offsets and first harmonics
+    of the joints wander from cycle to cycle, as does the pace."""
     rng = np.random.default_rng(seed)
     t = np.arange(cycles * samples * finer + 1) / (samples * finer)
     knots = np.arange(-2, cycles + 3)
@@ -193,8 +193,8 @@ def wandering(
 
 
 def covered_at_all_phases(log, velocity, **fit):
-    # Share of the entries of A that are covered, and half width of their intervals in
-    # the median, at 96 phases.
+    """Share of the entries of A that are covered, and half width of their intervals in
+    the median, at 96 phases."""
     f = measured.fit_log(log, **fit)
     t = 2 * np.pi * (np.arange(96) + 0.37) / 96
     found = f.along(t)
@@ -250,7 +250,7 @@ def test_intervals_cover_the_truth_in_many_logs(truth, gait, asked, least, least
 
 
 def corner(alpha, alphadot):
-    # A_theta2 is 0.4 or 0, by the sign of alphadot_2; of degree one.
+    """A_theta2 is 0.4 or 0, by the sign of alphadot_2; of degree one."""
     turn = 0.3 * alphadot[..., 0] + 0.4 * np.maximum(alphadot[..., 1], 0.0)
     return np.stack([0.2 * alphadot[..., 0], 0.1 * alphadot[..., 1], turn], -1)
 
@@ -347,7 +347,7 @@ def test_cycles_that_do_not_vary_tell_the_displacement_and_no_more(viscous):
 
 
 def wave(alpha, alphadot):
-    # A body of three joints, whose A has all entries.
+    """A body of three joints, whose A has all entries."""
     a, b, c = np.moveaxis(alpha, -1, 0)
     A = np.stack([
         np.stack([0.2 + 0.1 * np.sin(a + b), 0.1 * np.cos(b - c), -0.15 * np.sin(c)], -1),
@@ -396,7 +396,7 @@ def test_a_plane_of_three_joints_is_cut_out_where_the_data_reach(three_joints):
 
 
 def travelling(joints, harmonics=1):
-    # A wave of joint angles that goes along a chain, 0.9 rad from joint to joint.
+    """A wave of joint angles that goes along a chain, 0.9 rad from joint to joint."""
     turn = 0.9 * np.arange(joints)[:, None] * np.arange(1, harmonics + 1)
     size = 0.5 / np.arange(1, harmonics + 1) ** 2
     return gaits.Fourier(
@@ -405,7 +405,7 @@ def travelling(joints, harmonics=1):
 
 
 def bent(joints):
-    # The velocity of a made-up body.
+    """The velocity of a made-up body."""
     rng = np.random.default_rng(7)
     C = 0.2 * rng.normal(size=(3, joints))
     D = 0.15 * rng.normal(size=(3, joints, joints))
@@ -418,8 +418,8 @@ def bent(joints):
 
 
 def tied(rows, noise, spread=0.05):
-    # A log of joints of which those beyond the first are these combinations of them,
-    # to what encoders are off by.
+    """A log of joints of which those beyond the first are these combinations of them,
+    to what encoders are off by."""
     d = len(rows[0])
     whole = np.vstack([np.eye(d), rows])
     gait = {2: GAIT, 3: travelling(3, 2)}[d]
@@ -856,7 +856,7 @@ def short(viscous):
 
 
 def changed(columns, value, rows=slice(None)):
-    # A change of a table: value(its chosen rows) in some columns of these rows.
+    """A change of a table: value(its chosen rows) in some columns of these rows."""
 
     def change(table):
         table[rows, columns] = value(table[rows])
@@ -870,7 +870,7 @@ def noise(rows):
 
 
 def late(rows):
-    # 0 in the first half of a log, then the number of cycles from there on.
+    """0 in the first half of a log, then the number of cycles from there on."""
     return np.maximum(np.arange(len(rows)) - len(rows) // 2, 0) / 30
 
 
@@ -913,8 +913,8 @@ def test_bad_logs_get_one_line(change, said, short, tmp_path):
 
 
 def columns_of(path, header, rows=120, value=0.0, column=1):
-    # A file with these columns, of which those of time count and all others move by
-    # 0.05; one value in line 52 is larger.
+    """A file with these columns, of which those of time count and all others move by
+    0.05; one value in line 52 is larger."""
     names = header.split()
     table = 0.05 * np.sin(np.arange(rows)[:, None] + np.arange(len(names)))
     for k, name in enumerate(names):
@@ -1061,7 +1061,8 @@ def test_a_table_as_r_writes_it(short, tmp_path):
 
 @pytest.fixture(scope="module")
 def moving():
-    # Of a body that is no table, and turns and moves by a fifth of what its joints do.
+    """Of a body that is no table, and turns and moves by a fifth of what its joints
+    do."""
     return synthetic.synthetic_log(bent(2), GAIT, cycles=14, samples=30, seed=1)
 
 
@@ -1121,7 +1122,8 @@ def test_the_picture_shows_all_there_is():
 
 
 def cycles_of(sizes, rows=24):
-    # A log of an ellipse whose cycles have these sizes, its phase and the number of each row's cycle.
+    """A log of an ellipse whose cycles have these sizes, its phase and the number of
+    each row's cycle."""
     number = np.repeat(np.arange(len(sizes)), rows)
     at = 2 * np.pi * (np.arange(len(number)) + 0.5) / rows
     alpha = np.asarray(sizes)[number, None] * np.stack(
@@ -1143,7 +1145,8 @@ def cycles_of(sizes, rows=24):
 
 
 def two_kinds(kind, apart, share):
-    # Sizes of cycles of two kinds, ``apart`` from each other, between which lies this share of their spread.
+    """Sizes of cycles of two kinds, ``apart`` from each other, between which lies this
+    share of their spread."""
     count = np.array([kind.count("b"), kind.count("a")])
     scatter = apart * np.sqrt(count.prod() / count.sum() ** 2 * (1 / share - 1))
     sizes, sign = [], {"a": -1, "b": -1}
@@ -1246,8 +1249,8 @@ def test_units_are_noted_beyond_what_bodies_do(
 
 
 def log_with(values, column, t=None):
-    # A log with these values in a column of six, the others zero; its lines count from
-    # 2.
+    """A log with these values in a column of six, the others zero; its lines count from
+    2."""
     rows = np.zeros((len(values), 6))
     rows[:, column] = values
     lines = np.arange(len(values)) + 2

@@ -51,14 +51,14 @@ N = len(QUANTITIES)
 
 @pytest.fixture(autouse=True)
 def fast(request, monkeypatch):
-    # Puts noise on a few times, but where intervals are to cover the truth.
+    """Puts noise on a few times, but where intervals are to cover the truth."""
     if "cover" not in request.node.name:
         monkeypatch.setattr(intervals, "RESAMPLED", 6)
         monkeypatch.setattr(predicted, "RESAMPLED", 4)
 
 
 def refused(said):
-    # Whether a refusal with such a message is to come, or none, "", is.
+    """Whether a refusal with such a message is to come, or none, "", is."""
     if said:
         return pytest.raises(Refusal, match=said)
     return contextlib.nullcontext()
@@ -72,7 +72,7 @@ def trial_of(t, points, name="trial.csv"):
 
 @pytest.fixture(scope="module")
 def exact():
-    # A trial without noise: 3.3 cycles that repeat.
+    """A trial without noise: 3.3 cycles that repeat."""
     return synthetic.synthetic_midlines(
         GLASS, 3.3, 30, 16, noise=0.0, spread=0.0, jitter=0.0, seed=2
     )
@@ -93,7 +93,7 @@ def changed(trial, points):
 
 
 def frames_of(trial, kept):
-    # Some frames of a trial.
+    """Some frames of a trial."""
     parts = {name: getattr(trial, name)[kept] for name in ("t", "points", "lines")}
     return dataclasses.replace(trial, **parts)
 
@@ -102,8 +102,8 @@ def frames_of(trial, kept):
 
 
 def along_a_sine(amplitude, waves, cycles=3.0, frames=32, count=24):
-    # Points of a body of length 1 that slides along a sine without slip, one wave a
-    # cycle, at 0.3 rad to x.
+    """Points of a body of length 1 that slides along a sine without slip, one wave a
+    cycle, at 0.3 rad to x."""
     slope = 2 * np.pi * amplitude  # of a sine of wavelength 1
     arc = np.sqrt(1 + slope**2) * 4 * ellipe(slope**2 / (1 + slope**2)) / (2 * np.pi)
     x = np.linspace(-3, 9, 60001)
@@ -265,7 +265,7 @@ def test_smoothing_leaves_an_error_beside_that_of_noise_and_none_by_noise(
 
 
 def truth(system, **options):
-    # Quantities of an animal: of many cycles without noise.
+    """Quantities of an animal: of many cycles without noise."""
     cycles = 400 if options["spread"] else 8.2
     made = synthetic.synthetic_midlines(system, cycles, seed=99, noise=0.0, **options)
     return noiseless(made)
@@ -283,8 +283,8 @@ def noiseless(made, modes=14, even=0.0):
 
 
 def covered(system, known, seeds, cycles=8.4, frames=40, **options):
-    # Errors and half widths (N, Q) of trials of 30 points with 1 % noise. The heading
-    # is that of the trial, to which the animal's drift is added.
+    """Errors and half widths (N, Q) of trials of 30 points with 1 % noise. The heading
+    is that of the trial, to which the animal's drift is added."""
     errors = []
     widths = []
     k = QUANTITIES.index("heading")
@@ -493,7 +493,7 @@ def wide(trial, t="t", unit=""):
 
 
 def deeplabcut(trial, score=0.99):
-    # A film of 600 pixels, in which the body is 300 long and y runs down.
+    """A film of 600 pixels, in which the body is 300 long and y runs down."""
     count = trial.points.shape[1]
     parts = [f"part{k}" for k in range(count) for _ in "xyl"]
     rows = [
@@ -679,8 +679,8 @@ def test_heads_of_files_tell_midlines_from_logs(header, midlines):
 
 
 def line_of(frames=40, count=11):
-    # A straight body of length 1, tail at the origin and head at x = 1, that creeps
-    # along y.
+    """A straight body of length 1, tail at the origin and head at x = 1, that creeps
+    along y."""
     x = np.linspace(0, 1, count)
     y = 1e-6 * np.arange(frames)[:, None]
     points = np.stack(np.broadcast_arrays(x, y), -1)
@@ -688,8 +688,8 @@ def line_of(frames=40, count=11):
 
 
 def at(places, value):
-    # A change of a trial: its points at some places, (frames, points), have other
-    # values, or value(all of them).
+    """A change of a trial: its points at some places, (frames, points), have other
+    values, or value(all of them)."""
 
     def change(trial):
         points = trial.points.copy()
@@ -700,8 +700,8 @@ def at(places, value):
 
 
 def moved(wobble, move, jump):
-    # A change: y wobbles from frame to frame, moves, and jumps in point 4 of frame
-    # 20.
+    """A change: y wobbles from frame to frame, moves, and jumps in point 4 of frame
+    20."""
 
     def change(trial):
         points = trial.points.copy()
@@ -714,7 +714,7 @@ def moved(wobble, move, jump):
 
 
 def turned_beside(aside):
-    # A change: most frames run from the other end, so far beside the first.
+    """A change: most frames run from the other end, so far beside the first."""
     return at(slice(12, None), lambda p: p[12:, ::-1] + [0.0, aside])
 
 
@@ -790,21 +790,21 @@ def test_a_trial_whose_slips_are_mended_is_the_trial(change, noisy):
 
 
 def standing(trial):
-    # A body that bends to and fro in one shape.
+    """A body that bends to and fro in one shape."""
     s = np.linspace(-0.5, 0.5, 20)
     bend = np.sin(2 * np.pi * trial.t)[:, None]
     return trial_of(trial.t, np.stack([s - 0.4 * bend**2 * s**3, bend * s**2], -1))
 
 
 def backwards(_):
-    # A swimmer that its wave takes along, as where drag is less across the body than
-    # along it.
+    """A swimmer that its wave takes along, as where drag is less across the body than
+    along it."""
     swimmer = Swimmer(Viscous(0.4), Backbone(20))
     return synthetic.synthetic_midlines(swimmer, 3.4, 30, 20).trial()
 
 
 def sized(size, **facts):
-    # A change: points so much larger, with other facts.
+    """A change: points so much larger, with other facts."""
     return lambda t: dataclasses.replace(t, points=size * t.points, **facts)
 
 
@@ -978,8 +978,8 @@ def test_what_closes_the_gap_is_told_in_the_units_of_scenes(fitted, unit, value,
 
 
 def compared(off):
-    # A comparison whose predictions, with errors of 0.03 and 0.04, are off by so
-    # much.
+    """A comparison whose predictions, with errors of 0.03 and 0.04, are off by so
+    much."""
     count = len(predicted.COMPARED)
     values = np.full(count, 0.5)
     each = np.zeros((4, count))
