@@ -903,7 +903,6 @@ def late(rows):
             "line 212: two gaits: 6 cycles are of one kind and 6 of another, which begins here .t = 7.; give",
         ),
     ],
-    ids=str,
 )  # fmt: skip
 def test_bad_logs_get_one_line(change, said, short, tmp_path):
     path = written(tmp_path / "log.csv", short, change=change)
