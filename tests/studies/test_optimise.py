@@ -409,6 +409,16 @@ def test_a_direction_is_that_of_the_mean_heading_and_forwards(direction, stroke)
     assert direction == "y" or ahead == pytest.approx(stroke.value, rel=1e-3)
 
 
+def test_without_a_direction_a_gait_keeps_its_sense():
+    loops = Loops(2, 1, 2.5)
+    there = loops.from_gait(Circle())
+    one, other = (
+        optimise(viscous(gait=loops.gait(p)), "displacement", harmonics=1).best
+        for p in (there, series.reversed_loop(there))
+    )
+    assert one.displacement[0] == pytest.approx(-other.displacement[0], rel=1e-4)
+
+
 @pytest.mark.parametrize("limit", [{"rate": 3.0}, {"power": 0.02}, {}], ids=str)
 def test_speed_keeps_its_limit(limit):
     # At best it runs at constant power: the square of the speed is power times that of
@@ -967,6 +977,7 @@ def test_outlines_go_round_their_corners_to_the_left_at_constant_speed():
         )
         assert loops.gait(p).shape(2 * np.pi * t) == pytest.approx(known, abs=0.05)
         assert sum((np.conj(a) * b).imag for a, b in pairwise(ends)) > 0
+    assert len({frozenset(corners) for corners in series.OUTLINES}) == len(outlines)
 
 
 def test_further_starts_are_waves_about_the_middle_of_the_limits():
