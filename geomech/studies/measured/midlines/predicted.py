@@ -271,7 +271,7 @@ def _closing(
         def gap(x, name=name):
             return stride(_changed(swimmer.medium, name, x)) + offset - measured
 
-        closing = _closed(name, number.unit, float(value), gap, error, present)
+        closing = closing_of(name, number.unit, float(value), gap, error, present)
         if closing is not None:
             found.append(closing)
     return tuple(found)
@@ -285,7 +285,7 @@ def _changed(medium: Any, name: str, value: float) -> Any:
     return replace(medium, **changes)
 
 
-def _closed(name, unit, value, gap, error, stride) -> Closing | None:
+def closing_of(name, unit, value, gap, error, stride) -> Closing | None:
     """Return where a parameter closes the gap; None for a parameter that does not
     change the stride."""
     from scipy.optimize import brentq
