@@ -110,7 +110,6 @@ WRONG = {
     "frequency = 1.0 ": ("frequency = 0 ", "frequency must be a number from 0.001 to 200"),
     "density = 1500 ": ("density = -1 ", "density must be"),
     SCREW: ("", "[robot] the table [robot.screw] is missing: add it"),
-    "mass = 1.0": ("screw = 3\nmass = 1.0", "screw must be a table [robot.screw]"),
 }  # fmt: skip
 
 
