@@ -171,7 +171,8 @@ def test_a_table_is_read_from_any_of_its_columns(columns, folder):
 def test_the_medium_of_a_file_may_name_a_table_in_another(folder):
     medium = f"[medium]\n{TABLE}"
     found = scene.load(written(folder, FILE, REST + GAUSS, M_toml=medium, T_csv=csv()))
-    assert found.system.medium == Table(*rows(13))
+    direct = scene.load(written(folder, TABLE, REST + GAUSS, "direct.toml"))
+    assert found.system == direct.system
     assert scene.inputs(found)[1:] == [folder / "M.toml", folder / "T.csv"]
 
 
