@@ -78,15 +78,6 @@ def test_each_row_of_a_connection_has_its_scale_whose_top_may_be_a_percentile():
         np.testing.assert_allclose(longest, tops)
 
 
-def test_rows_are_chosen_and_one_of_zeros_is_left_out_with_a_word():
-    zero = Connection(AXES, A * [[[[1]]], [[[0]]], [[[1]]]], X, X)
-    figure = plots.connection_figure(zero)
-    assert titles(figure) == ["forward", "turning"]
-    assert figure.get_supxlabel() == r"$\mathbf{A}^{y}$: zero everywhere"
-    chosen = plots.connection_figure(zero, components=("y", "theta"))
-    assert titles(chosen) == ["sideways", "turning"]
-
-
 def test_a_row_of_rounding_has_no_arrows():
     """A snake that cannot slip sideways, in the frame of a wheeled link."""
     snake = scenes.load("no-slip-snake").changed(frame="link-2").with_numerics(grid=8)
@@ -221,31 +212,6 @@ def test_a_limit_is_a_number_of_one_unit_or_percentiles():
             colour_limit(text)
 
 
-def test_modes_are_named_on_the_axes():
-    """Shape variables that are no joint angles, and in the units of the colours."""
-    labels = (("bend", "deg"), ("roll", "m"))
-    plain = Field(AXES, FIELD.values)
-    for figure, unit in (
-        (plots.ccf_figure(plain, labels=labels), "/(deg m))"),
-        (plots.connection_figure(FITTED, labels=labels), "(m/deg)"),
-    ):
-        for ax in figure.axes[:2]:
-            assert (ax.get_xlabel(), ax.get_ylabel()) == ("bend (deg)", "roll (m)")
-        assert unit in figure.axes[3].get_ylabel()
-
-
-@pytest.mark.parametrize(
-    ("name", "unit", "label"),
-    [
-        ("alpha_12", "rad", r"$\alpha_{12}$ (rad)"),
-        ("m_12", "rad", "$m_{12}$ (rad)"),
-        ("drag_ratio", "-", "drag_ratio (-)"),
-    ],
-)
-def test_quantities_are_labelled_with_their_units(name, unit, label):
-    assert plots.quantity(name, unit) == label
-
-
 # Displacements
 
 
@@ -285,15 +251,6 @@ def edges(collection):
     """Lower and upper edge (2, B) of an area between two curves."""
     x, y = collection.get_paths()[0].vertices.T
     return [[f(y[x == a]) for a in np.unique(x)] for f in (np.min, np.max)]
-
-
-def test_tiers_of_one_amplitude_stand_side_by_side():
-    scene = scenes.load("three-link-viscous").with_numerics(grid=9)
-    table = SceneTables(scene).displacements([0.5])
-    ax = plots.displacement(table)
-    points = [line.get_xdata().item() for line in ax.lines if line.get_marker() == "o"]
-    assert len({*points}) == len(points) == table.sizes["tier"]
-    assert np.mean(points) == pytest.approx(0.5) and ax.get_xticks().tolist() == [0.5]
 
 
 MEASURED_DATA = {"amplitude": [0.4, 0.9], "value": [0.1, 0.2], "error": [0.02, 0.03]}
@@ -366,25 +323,6 @@ def test_panels_that_are_zero_are_left_out_with_a_reason(
     assert told in figure.get_supxlabel()
     with pytest.raises(Refusal, match="component: 'z' is unknown"):
         plots.displacement_figure({"a": result}, components=("z",))
-
-
-def test_a_panel_that_another_gait_needs_says_that_it_is_zero():
-    poses = {"amplitude": [0.5], "direct": [[0.1, 0.02, 0.0]]}
-    moves = of_table(poses, zero={"heading": "by mirror"})
-    still = of_table(poses, zero=BY_SYMMETRY)
-    figure = plots.displacement_figure({"circle": moves, "butterfly": still})
-    assert " ".join(figure.axes[4].texts[0].get_text().split()) == "y: zero by reversal"
-
-
-def test_the_distance_of_a_timed_gait_has_an_axis_of_speed():
-    scene = scenes.load("three-link-viscous").changed(gait=Ellipse(frequency=2.5))
-    table = SceneTables(scene).displacements([0.5, 1.0], ["direct"])
-    figure = plots.displacement_figure({"ellipse": table}, components=("x", "distance"))
-    distance = figure.axes[1]
-    (right,) = distance.child_axes
-    figure.draw_without_rendering()
-    assert right.get_ylabel() == "speed (BL/s) at 2.5 Hz"
-    np.testing.assert_allclose(right.get_ylim(), np.array(distance.get_ylim()) * 2.5)
 
 
 # Sweeps and accuracy
@@ -470,30 +408,6 @@ def test_a_work_precision_diagram_takes_errors_of_0(error, against):
     (ax,) = figure.axes
     assert (ax.get_title(), ax.get_ylabel()) == PANELS[against]
     np.testing.assert_array_equal(ax.lines[0].get_ydata(), np.maximum(error, 1e-17))
-
-
-def test_the_work_precision_diagram_says_what_its_lines_are():
-    phases = Setting("phases", (16, 32, 64), 2, tier="direct")
-    grid = Setting("grid", (7, 31, 61), 4, tier="area")
-    directions = Setting("directions", (2, 8), 2, "", "limit", "path")
-    fine = 1e-3 * 4.0 ** -np.arange(3)
-    coarse = [0.02, 0.0200001, 0.01999]
-    left, right = plots.accuracy_figure(
-        studied(
-            (phases, fine, [0.1, 0.2, 0.3]),
-            (grid, coarse, [0.2, 0.3, 0.4]),
-            (directions, [0.1, 0], [1, 2]),
-        )
-    ).axes
-    assert texts(left.get_legend().get_texts()) == [
-        "direct: phases a cycle, 16 to 64, order 2.0",
-        "area: points a joint of the grid, 7 to 61, no gain",
-    ]
-    (told,) = texts(right.get_legend().get_texts())
-    assert told == "path: directions of the fit, 2 to 8"
-    np.testing.assert_array_equal(
-        left.lines[1].get_xydata().T, [[0.2, 0.3, 0.4], coarse]
-    )
 
 
 # Options

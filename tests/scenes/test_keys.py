@@ -17,7 +17,7 @@ from geomech.scenes import (
     parse,
     walker_names,
 )
-from geomech.scenes.format.key import Key, aliases, keys_of
+from geomech.scenes.format.key import Key, aliases
 from geomech.scenes.format.keys import SCENES, all_variants, sections, worded
 from geomech.scenes.format.schema import schema
 from geomech.scenes.format.sections import file_sections, keys_in
@@ -54,55 +54,6 @@ def test_every_key_of_every_class_has_a_type_a_unit_and_a_meaning():
             assert 0 < len(key.unit) < 25 and len(key.meaning) < 500, place
             assert worded(key.schema) != "value", place  # no scene file has its type
             assert key.degrees == (key.unit == "rad"), place
-
-
-def test_a_docstring_tells_keys_and_that_of_a_subclass_goes_first():
-    @dataclasses.dataclass(frozen=True)
-    class Base:
-        """first (rad): of the base. second, third (rad): of both."""
-
-        first: float
-        second: float | None = None
-        third: tuple[tuple[int, ...], ...] = ()
-
-    @dataclasses.dataclass(frozen=True)
-    class Derived(Base):
-        """A thing. Not (a key): this one.
-
-        first (1/s): its own,
-        on two lines; (in brackets). fourth (-): "text".
-
-        More of first is not told.
-        """
-
-        fourth: str = "x"
-        fifth: bool = True
-
-    told = [
-        (worded(key.schema), key.value, key.unit, key.meaning)
-        for key in keys_of(Derived)
-    ]
-    assert told == [
-        ("number", "required", "1/s", "its own, on two lines; (in brackets)"),
-        ("number", "none", "rad", "of both"),
-        ("list of lists of whole numbers", "[]", "rad", "of both"),
-        ("text", '"x"', "-", '"text"'),
-        ("true or false", "true", "", ""),
-    ]
-
-
-@pytest.mark.parametrize("section", sections())
-def test_the_command_prints_each_key_of_a_section_with_its_meaning(section, geomech):
-    code, out, err = geomech("reference", section)
-    assert (code, err) == (0, "")
-    assert max(map(len, out.splitlines())) <= 120
-    for part in sections()[section]:
-        assert part.title in out
-        for key in part.keys:
-            row = (
-                rf"^  {key.name} +{worded(key.schema)} +{re.escape(key.unit)} +\S+ +\S"
-            )
-            assert re.search(row, out, re.M), key.name
 
 
 def test_the_command_prints_angles_as_degrees_too_and_all_sections(geomech):

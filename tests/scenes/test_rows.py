@@ -136,9 +136,11 @@ def test_cells_that_only_python_takes_for_numbers_are_refused(cell, place, tmp_p
     push = written(tmp_path / "push.csv", PLAIN.replace("0.50,", cell + ","))
     with pytest.raises(Refusal, match=place):
         penetration.read(rows.read(push, 10_000, ""))
-    text = film(tracks()).replace("\n1,", f"\n1,{cell},", 1)
+    head = "t," + ",".join(f"x{p},y{p}" for p in range(5))
+    lines = [f"{t},1,2,3,4,5,6,7,8,9,10" for t in range(15)]
+    lines[1] = lines[1].replace("1,1,", f"1,{cell},", 1)
     with pytest.raises(Refusal, match="t.csv, line 3"):
-        reader.read(written(tmp_path / "t.csv", text))
+        reader.read(written(tmp_path / "t.csv", "\n".join([head, *lines])))
 
 
 @pytest.mark.parametrize(
@@ -279,43 +281,6 @@ def deeplabcut(individuals: dict[str, np.ndarray | None], score: float = 0.97) -
     return "\n".join(",".join(line) for line in (*heads, *lines))
 
 
-def film(*animals):
-    """A row for each frame of one animal, or for each point of several."""
-    if len(animals) == 1:
-        lines = [[k, *x.ravel()] for k, x in enumerate(animals[0])]
-        head = "t," + ",".join(f"x{p},y{p}" for p in range(5))
-    else:
-        head = "t,individual,point,x,y"
-        lines = [
-            [f, name, p, x, -y]
-            for name, points in zip("ab", animals)
-            for f, frame in enumerate(points)
-            for p, (x, y) in enumerate(frame)
-        ]
-    return "\n".join([head, *(",".join(map(str, line)) for line in lines)])
-
-
-def test_a_film_is_the_same_from_deeplabcut_and_sleap(tmp_path):
-    """y runs down in both, and a score of SLEAP of 0.4 is no likelihood."""
-    for text in (sleap([("a", tracks())]), deeplabcut({"a": tracks()})):
-        found = reader.read(written(tmp_path / "s.csv", text))
-        np.testing.assert_allclose(found.points, tracks() * [1, -1])
-    unsaid = reader.read(written(tmp_path / "p.csv", film(tracks())))
-    np.testing.assert_allclose(unsaid.points, tracks())
-    assert any("y is taken to run up" in note for note in unsaid.notes)
-    assert reader.read(tmp_path / "s.csv", scale=0.5).unit == "m"
-
-
-def test_a_limit_that_drops_many_points_is_told_first(tmp_path):
-    path = written(tmp_path / "d.csv", deeplabcut({"a": tracks()}, 0.5))
-    trial = reader.read(path)
-    assert np.isnan(trial.points).all() and "least_score" in trial.notes[0]
-    few = deeplabcut({"a": tracks()}).replace("0.97", "0.1", 7)  # of 75
-    assert not any("MANY" in x for x in reader.read(written(path, few)).notes)
-    asked = written(path, sleap([("a", tracks())]))
-    assert np.isnan(reader.read(asked, least_score=0.6).points).all()
-
-
 def test_individuals_without_points_are_left_out_unless_named(tmp_path):
     dish = np.broadcast_to([[40.0, 50.0], [640.0, 50.0]], (15, 2, 2))
     text = deeplabcut({"worm1": tracks(), "worm2": None, "single": dish})
@@ -331,12 +296,14 @@ def test_individuals_without_points_are_left_out_unless_named(tmp_path):
     "text",
     [
         deeplabcut({"a": tracks(), "b": tracks() + 9}),
-        sleap([("a", tracks()), ("b", tracks() + 9)]),
-        film(tracks(), tracks() + 9),
+        sleap(
+            [("a", tracks()), ("b", tracks() + 9)]
+        ),  # a score of 0.4 is no likelihood
     ],
-    ids=["deeplabcut", "sleap", "rows"],
+    ids=["deeplabcut", "sleap"],
 )
 def test_one_of_several_animals_is_named(text, tmp_path):
+    """y runs down in both."""
     path = written(tmp_path / "d.csv", text)
     with pytest.raises(Refusal, match="2 (individuals|animals) are in it: a, b"):
         reader.read(path)
