@@ -192,19 +192,14 @@ def test_a_table_passes_through_its_rows_in_units_of_axial_drag(t, n, speed):
     np.testing.assert_allclose(found, expected / 0.5, rtol=1e-12, atol=1e-12)
 
 
-def test_a_table_mirrors_resists_and_does_not_overshoot():
+def test_a_table_does_not_overshoot():
+    """Between its rows it is monotone."""
     table = Table(PSI, F_T, F_N)
-    v = np.random.default_rng(0).normal(size=(2, 50))
-    t, n = table.traction(*v)
-    np.testing.assert_array_equal(table.traction(-v[0], v[1]), [-t, n])
-    np.testing.assert_array_equal(table.traction(v[0], -v[1]), [t, -n])
-    assert (t * v[0] + n * v[1] > 0).all()
-    assert table.traction(0.0, 0.0) == (0.0, 0.0)
     fine = np.linspace(0, np.pi / 2, 2001)
-    rises = np.sign(np.diff([0.0, *F_N[1:]]))[np.searchsorted(PSI, fine[1:]) - 1]
+    row = np.searchsorted(PSI, fine)
+    rises = np.sign(np.diff([0.0, *F_N[1:]]))[row[1:] - 1]
     steps = np.diff(table.traction(np.cos(fine), np.sin(fine))[1])
-    inside = np.searchsorted(PSI, fine[1:]) == np.searchsorted(PSI, fine[:-1])
-    assert (rises * steps >= -1e-12)[inside].all()  # monotone between rows
+    assert (rises * steps >= -1e-12)[row[1:] == row[:-1]].all()
 
 
 def test_rows_measured_again_are_averaged_and_must_be_finite():
@@ -214,25 +209,6 @@ def test_rows_measured_again_are_averaged_and_must_be_finite():
     np.testing.assert_allclose(0.5 * found, [[0.5, 0.4], [1.1, 1.3]], rtol=1e-12)
     with pytest.raises(ValueError, match="f_n must be finite"):
         Table(PSI, F_T, [*F_N[:-1], np.inf])
-
-
-@pytest.mark.parametrize("eps", [0.0, 0.3])
-def test_slopes_of_a_table_are_continuous_and_its_own(eps):
-    table = Table(*rows(7))
-    v = np.random.default_rng(2).normal(size=(2, 60))
-    slopes = np.array(table.slopes(*v, eps))
-    for k in range(2):
-        step = 1e-6 * np.eye(2)[k][:, None]
-        change = np.subtract(
-            table.traction(*(v + step), eps), table.traction(*(v - step), eps)
-        )
-        np.testing.assert_allclose(slopes[k::2], change / 2e-6, rtol=1e-5, atol=1e-7)
-    joins = np.array([*rows(7)[0], -np.pi / 6, np.pi])  # where the cubics meet
-    before, after = (
-        np.array(table.slopes(np.cos(psi), np.sin(psi), eps))
-        for psi in (joins - 1e-9, joins + 1e-9)
-    )
-    np.testing.assert_allclose(before, after, atol=1e-6)
 
 
 def test_a_dense_table_is_the_law_it_came_from():
