@@ -27,7 +27,6 @@ from figures.paper import (
 from figures.swimmers import frames_area
 from geomech.scenes import load
 from geomech.studies.scene_tables import SceneTables
-from rft import CATALOGUE
 
 pytestmark = pytest.mark.usefixtures("fastest")
 SCRIPTS = {
@@ -180,22 +179,6 @@ def test_fig05c():
     found = fit["C"], math.degrees(fit["gamma0"]), fit["k"]
     assert found == pytest.approx((1.49, 12.6, 2.49), rel=0.005)
     assert fit["rms_N"] == pytest.approx(0.056, abs=0.001)
-
-
-def test_fig05c_draws_across_solid_and_along_dashed(tmp_path):
-    numbers = fig05c_force_law.compute(angles=7)
-    lines = drawn(fig05c_force_law, numbers, tmp_path).axes[0].lines
-    psi = np.linspace(0, np.pi / 2, 7)
-    for k, name in enumerate(("glass-0.3mm-loose", "glass-0.3mm-close", "viscous-2")):
-        along, across = CATALOGUE[name].medium.traction(np.cos(psi), np.sin(psi))
-        solid, dashed = lines[2 * k : 2 * k + 2]
-        np.testing.assert_allclose(solid.get_ydata(), across, atol=1e-12)
-        np.testing.assert_allclose(dashed.get_ydata(), along, atol=1e-12)
-        assert (solid.get_linestyle(), dashed.get_linestyle()) == ("-", "--")
-    # N, Eq. 2 and the header of the data
-    scale = numbers["fit"]["k"] * 2 * 0.588 * 1030 * 9.81 * 0.008 * 0.030 * 0.080
-    measured = numbers["bed"]["perpendicular"] / scale
-    np.testing.assert_allclose(lines[6].get_ydata(), measured)
 
 
 def test_fig11c(tmp_path):

@@ -1,4 +1,5 @@
-"""The engine of three dimensions: momentum, energy, order, its speeds beside those of the planar engine, ends."""
+"""The engine of three dimensions: momentum, energy, order, ends, and its speeds beside
+those of the planar engine."""
 
 import dataclasses
 import math
@@ -119,7 +120,7 @@ def test_other_geoms_touch_the_floor_but_for_a_surface_that_names_none():
 
 
 def test_legs_turn_by_their_clock_across_its_kinks():
-    """Of a clock with two rates, by 1e-4 rad, which is how far they yield to the robot's weight."""
+    """Of a clock with two rates, as far as they yield to the robot's weight."""
     walker = dataclasses.replace(XPLORER.walker, gait=Tripod(2.0, 0.3, 1.2))
     one = Simulation(walker, QUICK)
     rows, states = [], []
@@ -277,8 +278,8 @@ def test_who_turns_is_not_told_by_strides_along_a_line(turn, monkeypatch):
 
 @needs_numba
 def test_a_plain_wheel_rolls_as_fast_as_the_grains_bear_it():
-    """At the default grazing, where triangles lead or do not as a whole: against the balance of forces of a wheel of 400
-    elements, with the slip at which it pulls nothing; both engines tell how far they are off."""
+    """Against the balance of forces of a wheel of 400 elements, with the slip at which it
+    pulls nothing; both engines tell their error."""
     stress, wheel, turn = (
         VERTICAL["poppy-seeds-loose"].stress,
         Wheel(0.1, 0.08),
@@ -336,7 +337,7 @@ def test_a_robot_is_stuck_that_goes_less_than_a_fiftieth_of_its_reach(ahead, sta
 
 
 def test_a_row_tells_place_attitude_and_their_rates():
-    """Of a robot turned by yaw, pitch and roll, nose down where the pitch is positive."""
+    """Of a robot turned by yaw, pitch and roll; its nose is down at a positive pitch."""
     one = Simulation(XPLORER.walker, QUICK)
     data = one.body.data
     turn = Rotation.from_euler("ZYX", (0.4, 0.3, -0.2))
@@ -357,7 +358,7 @@ def test_a_row_tells_place_attitude_and_their_rates():
     [(-0.497, 0.0, ""), (-0.503, 0.0, "sunk"), (-1.7, 1.0, ""), (-6.0, 1.6, "flipped")],
 )
 def test_a_robot_is_sunk_with_all_of_its_hull(height, tilt, status):
-    """Whose highest corner counts, whichever way it is tilted. height: over the hull's."""
+    """Its highest corner counts, whichever way it is tilted. height: over the hull's."""
     one = Simulation(XPLORER.walker, QUICK)
     data = one.body.data
     data.qpos[2] = height * XPLORER.robot.height

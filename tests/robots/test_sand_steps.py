@@ -58,7 +58,7 @@ def after(model, data, seconds):
 
 
 def in_loose(model, seconds, start=lambda data: None, **options):
-    """Positions after some seconds in loose poppy seeds, the speed then, and what the steps cost."""
+    """Positions after some seconds in loose poppy seeds, the speed then, and effort."""
     data = mujoco.MjData(model)
     start(data)
     with rft.mujoco.attach(model, LOOSE, **options) as sand:
