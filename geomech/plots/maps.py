@@ -503,7 +503,7 @@ def scale_limit(values: np.ndarray, clim: float | str | None = None) -> float:
     `largest`."""
     if clim is None:
         return largest(values)
-    if not isinstance(clim, str):
+    if not isinstance(clim, str) or not clim.endswith("%"):
         return float(clim)
     finite = values[np.isfinite(values)]
     if not finite.size:

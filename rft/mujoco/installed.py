@@ -157,12 +157,14 @@ def _free_row() -> int:
     return int(free[0])
 
 
-def remove(row: int) -> None:
-    """Take a bed out of the table; the last one takes the callback with it."""
+def remove(row: int, bed: Bed | None = None) -> None:
+    """Take a bed out of the table, unless another has its row by now; the last one
+    takes the callback with it. bed: by default the one that is there."""
     with _lock:
-        entry = _entries.pop(row, None)
-        if entry is None:
+        entry = _entries.get(row)
+        if entry is None or (bed is not None and entry.bed is not bed):
             return
+        del _entries[row]
         TABLE[row, 0] = REMOVED
         entry.finalizer.detach()
         _retired.append(entry)
@@ -179,9 +181,11 @@ def replace_bed(row: int, bed: Bed) -> None:
             entry.layout.arrays["laws"][:] = _law_numbers(bed)
 
 
-def is_installed(row: int) -> bool:
-    """Return whether the callback serves the bed of a row now."""
-    return row in _entries and bool(_active) and mujoco.get_mjcb_passive() is _active[0]
+def is_installed(row: int, bed: Bed) -> bool:
+    """Return whether the callback serves the bed in its row now."""
+    entry = _entries.get(row)
+    is_there = entry is not None and entry.bed is bed
+    return is_there and bool(_active) and mujoco.get_mjcb_passive() is _active[0]
 
 
 def beds(model: mujoco.MjModel) -> list[Bed]:

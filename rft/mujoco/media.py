@@ -172,8 +172,8 @@ class Media(Sequence):
 
     def detach(self) -> None:
         """Take the beds away."""
-        for row in self._rows:
-            installed.remove(row)
+        for row, bed in zip(self._rows, self._beds):
+            installed.remove(row, bed)
 
 
 def with_medium(bed: Bed, medium: Any) -> Bed:

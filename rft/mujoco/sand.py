@@ -116,7 +116,7 @@ class Sand:
     @property
     def is_attached(self) -> bool:
         """Whether steps of the model feel the sand."""
-        return installed.is_installed(self._row)
+        return installed.is_installed(self._row, self._bed)
 
     def detach(self) -> None:
         """Take the sand away and let the geoms touch the floor again; a second call
@@ -124,7 +124,7 @@ class Sand:
         was_attached = self._row >= 0
         model = self._model()
         self._detach_media()
-        installed.remove(self._row)
+        installed.remove(self._row, self._bed)
         self._row = -1
         if was_attached and model is not None and self._excluded_contacts:
             restore_floor_contacts(model, *self._excluded_contacts)
@@ -139,7 +139,7 @@ class Sand:
         body, (6,), in the world."""
         model = self._checked_model(data)
         number = body
-        if not isinstance(body, int):
+        if isinstance(body, str):
             number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, body)
         require(0 <= number < model.nbody, f"the model has no body {formatted(body)}")
 

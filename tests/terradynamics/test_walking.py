@@ -419,7 +419,7 @@ def test_explicit_steps_chatter_where_implicit_ones_do_not(tmp_path):
 
 def test_the_figure_of_wheels_shows_what_inertia_of_grains_does(tmp_path):
     numbers = wheel_figure.compute(slips=4)
-    smooth, lugs = numbers["found"].values()
+    smooth, lugs = numbers["wheels"].values()
     axes = drawn(wheel_figure, numbers, tmp_path).axes
     sinkage = 1e3 * lugs[30.0].sinkage
     np.testing.assert_allclose(curve(axes[3], "30 rad/s"), [numbers["slip"], sinkage])

@@ -205,7 +205,8 @@ class Multibody:
         data.time = begin + h
         sums = [*data.qpos, *data.qvel, self.work, self.loss]
         require(
-            bool(np.isfinite(sums).all()) and installed.is_installed(self._row),
+            bool(np.isfinite(sums).all())
+            and installed.is_installed(self._row, self._bed),
             f"the time step at {begin:.4g} s cannot be solved",
             instead="make steps shorter",
         )
