@@ -670,8 +670,8 @@ def test_figure_12_draws_and_lists_its_walks(tmp_path):
 @pytest.mark.parametrize("name", walking_sensitivity.NAMES)
 def test_the_figure_of_sensitivity_changes_one_size_at_a_time(name):
     as_it_is, other = walking_sensitivity.CHOICES.get(name, (1.0, 1.4))
-    assert walking_sensitivity.varied(SANDBOT, name, as_it_is) == SANDBOT
-    assert walking_sensitivity.varied(SANDBOT, name, other) != SANDBOT
+    assert walking_sensitivity.with_change(SANDBOT, name, as_it_is) == SANDBOT
+    assert walking_sensitivity.with_change(SANDBOT, name, other) != SANDBOT
 
 
 def test_the_table_of_sensitivity_has_per_cent(tmp_path):
