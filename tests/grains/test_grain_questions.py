@@ -12,7 +12,7 @@ from tabled import tabled
 from figures.grains import beds as beds_figure
 from figures.grains import plates as plates_figure
 from figures.grains.campaigns import grains as campaign
-from figures.paper.fig08a_rods import on_face
+from figures.paper.fig08a_rods import face_stress
 from geomech import load_result, scenes
 from geomech.questions.grains.drag_grains import DragGrains
 from geomech.questions.grains.grains import Grains
@@ -294,7 +294,7 @@ def test_plates_in_grains_stand_beside_bars_and_the_map():
     # At one depth for all rows the lift is that of the map for a rod.
     depth = campaign.BAR_DEPTH + campaign.BAR * np.cos(bar["beta"])
     deep = bar | {"weight": bar["weight"] / depth}
-    stress = on_face(StressMap(tension="keep"), plates_figure.BETA)
+    stress = face_stress(StressMap(tension="keep"), plates_figure.BETA)
     lift = plates_figure.lift_over_drag(deep, plates_figure.BETA, *stress)
     assert lift == pytest.approx(0.81, abs=0.01)
     pulls = maps["keep"]["normal"] < 0
