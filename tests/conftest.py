@@ -150,9 +150,12 @@ def blank_pictures(request, monkeypatch):
     if agg and request.module.__name__ not in LAID_OUT:
         figure = sys.modules["matplotlib.figure"].Figure
         drawn = figure.draw
-        blank = lambda fig, renderer: (
-            None if isinstance(renderer, agg.RendererAgg) else drawn(fig, renderer)
-        )
+
+        def blank(fig, renderer):
+            return (
+                None if isinstance(renderer, agg.RendererAgg) else drawn(fig, renderer)
+            )
+
         monkeypatch.setattr(figure, "draw", blank)
 
 

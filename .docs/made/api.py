@@ -81,9 +81,10 @@ def write(folder: Path) -> None:
 
 def readable(app, what: str, name: str, obj, options, lines: list[str]) -> None:
     """Turn a docstring of plain sentences into reStructuredText: |x| is no substitution, and a table stays as it is."""
-    escaped = lambda some: [
-        re.sub(r"(``.*?``)|\|", lambda x: x[1] or r"\|", line) for line in some
-    ]
+
+    def escaped(some):
+        return [re.sub(r"(``.*?``)|\|", lambda x: x[1] or r"\|", line) for line in some]
+
     heads = {
         lines[k - 1].strip(): k - 1
         for k, line in enumerate(lines)
@@ -231,7 +232,10 @@ def _public(module) -> list[str]:
     """Return the names in __all__, else those that the module itself defines."""
     if hasattr(module, "__all__"):
         return sorted(module.__all__)
-    own = lambda value: getattr(value, "__module__", "") == module.__name__
+
+    def own(value):
+        return getattr(value, "__module__", "") == module.__name__
+
     return sorted(
         name
         for name, value in vars(module).items()

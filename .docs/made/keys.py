@@ -36,7 +36,9 @@ def _part(part: keys.Part) -> str:
 def _row(
     name: str, kind: str, unit: str, value: str, meaning: str, degrees: bool
 ) -> str:
-    cell = lambda text: text.replace("|", r"\|")
+    def cell(text):
+        return text.replace("|", r"\|")
+
     meaning += f"; in degrees as `{name}_deg`" * degrees
     value = value if value in ("required", "none") else f"`{cell(value)}`"
     return f"| `{name}` | {kind} | {cell(unit)} | {value} | {cell(meaning)} |"

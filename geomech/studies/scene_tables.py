@@ -347,8 +347,9 @@ class SceneTables:
         gait: Gait | None = None,
         progress: Callable | None = None,
     ) -> Result:
-        """Return the net poses (`geomech.studies.displacement.variables.displacement_result`) by tiers
-        of TIERS (`default_tiers` if None), with their errors
+        """Return the net poses
+        (`geomech.studies.displacement.variables.displacement_result`) by tiers of TIERS
+        (`default_tiers` if None), with their errors
         (`geomech.studies.estimates.estimate`).
 
         seconds, by part: time to build each table ("field", "harmonic table" ...), even

@@ -229,9 +229,10 @@ def test_tiny_gaits_in_sand():
 @pytest.mark.parametrize("medium", MEDIA)
 def test_scallops_go_nowhere(medium):
     """A gait of no area, and every gait followed by its reversal."""
-    velocity = lambda a, d: (
-        body_velocity(MEDIA[medium], Chain((1, 1.3, 0.8)), a, d).checked().xi
-    )
+
+    def velocity(a, d):
+        return body_velocity(MEDIA[medium], Chain((1, 1.3, 0.8)), a, d).checked().xi
+
     scallop = Fourier(centre=(0.3, 0.5), cos=((1.0,), (0.6,)), sin=((0.0,), (0.0,)))
     assert np.abs(direct(velocity, scallop, phases=64)).max() < 1e-9
     forth, back = (

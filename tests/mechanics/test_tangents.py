@@ -111,7 +111,10 @@ def test_effects(name, medium):
     v[0] = np.sign(v[0]) * (
         0.01 + np.abs(v[0])
     )  # skin friction steps where an element slides neither way
-    load = lambda v: loads_on(problem, v, eps)
+
+    def load(v):
+        return loads_on(problem, v, eps)
+
     assert_is_slope(load, v)
     # Samples in another order have their own memories and places.
     other = rng.permutation(samples)[:7]

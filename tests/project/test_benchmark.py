@@ -56,15 +56,18 @@ def test_against_a_loop_of_fsolve():
     some = np.random.default_rng(0).choice(len(alpha), 100, replace=False)
     gait = Circle().cycle(64)
     alike = {"traits": Swimmer(GLASS, MIDDLE).traits}
-    field = lambda how, threads, **known: connection.fit(
-        lambda a, d: (
-            body_velocity(GLASS, MIDDLE, a, d, backend=how, threads=threads).xi
-        ),
-        connection.grid(2),
-        8,
-        trusted=True,
-        **known,
-    )
+
+    def field(how, threads, **known):
+        return connection.fit(
+            lambda a, d: (
+                body_velocity(GLASS, MIDDLE, a, d, backend=how, threads=threads).xi
+            ),
+            connection.grid(2),
+            8,
+            trusted=True,
+            **known,
+        )
+
     asked, samples = (
         {"loop": lambda: [one_scipy_solve(alpha[i], alphadot[i]) for i in some]},
         {"loop": len(some)},
@@ -73,9 +76,10 @@ def test_against_a_loop_of_fsolve():
         for threads in sorted({1, os.cpu_count()}):
             for what, known in (("field", alike), ("field without symmetry", {})):
                 name = f"{what}, {NAMES[how]}, {threads} core{'s' * (threads > 1)}"
-                solve = lambda how=how, threads=threads, known=known: field(
-                    how, threads, **known
-                )
+
+                def solve(how=how, threads=threads, known=known):
+                    return field(how, threads, **known)
+
                 asked[name], samples[name] = solve, len(alpha)
         swimmer = Swimmer(GLASS, MIDDLE, solver=Solver(backend=how))
         for name, f, (a, d) in (
@@ -83,7 +87,10 @@ def test_against_a_loop_of_fsolve():
             ("gait of 64 phases, all solved", swimmer.solve, gait),
             ("one velocity", swimmer.solve, (gait[0][3], gait[1][3])),
         ):
-            solve = lambda f=f, a=a, d=d: [f(a, d) for _ in range(CALLS)]
+
+            def solve(f=f, a=a, d=d):
+                return [f(a, d) for _ in range(CALLS)]
+
             asked[f"{name}, {NAMES[how]}"], samples[f"{name}, {NAMES[how]}"] = (
                 solve,
                 CALLS * a[..., 0].size,
@@ -116,11 +123,12 @@ def test_starts():
     anyway."""
     for name, gait in {"circle": Circle(), "butterfly": Butterfly()}.items():
         alpha, alphadot = gait.cycle(64)
-        solve = lambda step, first=0, alpha=alpha, alphadot=alphadot, **given: (
-            body_velocity(
+
+        def solve(step, first=0, alpha=alpha, alphadot=alphadot, **given):
+            return body_velocity(
                 GLASS, MIDDLE, alpha[first::step], alphadot[first::step], **given
             )
-        )
+
         xi = solve(1).xi
         between = (xi[::2] + np.roll(xi[::2], -1, 0)) / 2
         ways = {
@@ -154,9 +162,10 @@ def test_a_march_of_a_hundred_elements():
     """Steps with a transient, by both back ends."""
     alpha, alphadot = Sine(elements=100).cycle(32, 0.2)
     given = {"effects": (Transient(travel=0.05),), "cycles": 2}
-    march = lambda how: time_steps(
-        GLASS, Backbone(100), alpha, alphadot, backend=how, **given
-    )
+
+    def march(how):
+        return time_steps(GLASS, Backbone(100), alpha, alphadot, backend=how, **given)
+
     answers = [march(how).xi for how in backends()]
     for other in answers[1:]:
         np.testing.assert_allclose(other, answers[0], atol=1e-10)
@@ -173,7 +182,10 @@ def test_direct_tier_of_a_circle_to_four_digits():
     """One circle at the fewest phases that bring it within 1e-4 body lengths of the
     truth."""
     for how in backends():
-        swimmer = lambda a, d: body_velocity(GLASS, Chain(), a, d, backend=how).xi
+
+        def swimmer(a, d):
+            return body_velocity(GLASS, Chain(), a, d, backend=how).xi
+
         for radius in (0.5, 1.0, 1.75):
             gait, n = Circle(amplitude=radius), 16
             truth = direct(swimmer, gait, phases=4096)
@@ -219,7 +231,10 @@ def test_the_geometers_pipeline():
 
     alpha, alphadot = (x.reshape(-1, 2) for x in field_samples(count=2))
     some = np.random.default_rng(0).choice(len(alpha), 50, replace=False)
-    loop = lambda: [one_scipy_solve(alpha[i], alphadot[i]) for i in some]
+
+    def loop():
+        return [one_scipy_solve(alpha[i], alphadot[i]) for i in some]
+
     pipeline(), loop()  # loads what is loaded once
     a_loop, ours = (
         cpu(loop) * len(alpha) / len(some),

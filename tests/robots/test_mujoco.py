@@ -278,8 +278,8 @@ def test_who_turns_is_not_told_by_strides_along_a_line(turn, monkeypatch):
 
 @needs_numba
 def test_a_plain_wheel_rolls_as_fast_as_the_grains_bear_it():
-    """Against the balance of forces of a wheel of 400 elements, with the slip at which it
-    pulls nothing; both engines tell their error."""
+    """Against the balance of forces of a wheel of 400 elements, with the slip at which
+    it pulls nothing; both engines tell their error."""
     stress, wheel, turn = (
         VERTICAL["poppy-seeds-loose"].stress,
         Wheel(0.1, 0.08),
@@ -337,7 +337,8 @@ def test_a_robot_is_stuck_that_goes_less_than_a_fiftieth_of_its_reach(ahead, sta
 
 
 def test_a_row_tells_place_attitude_and_their_rates():
-    """Of a robot turned by yaw, pitch and roll; its nose is down at a positive pitch."""
+    """Of a robot turned by yaw, pitch and roll; its nose is down at a positive
+    pitch."""
     one = Simulation(XPLORER.walker, QUICK)
     data = one.body.data
     turn = Rotation.from_euler("ZYX", (0.4, 0.3, -0.2))
@@ -358,7 +359,8 @@ def test_a_row_tells_place_attitude_and_their_rates():
     [(-0.497, 0.0, ""), (-0.503, 0.0, "sunk"), (-1.7, 1.0, ""), (-6.0, 1.6, "flipped")],
 )
 def test_a_robot_is_sunk_with_all_of_its_hull(height, tilt, status):
-    """Its highest corner counts, whichever way it is tilted. height: over the hull's."""
+    """Its highest corner counts, whichever way it is tilted. height: over the
+    hull's."""
     one = Simulation(XPLORER.walker, QUICK)
     data = one.body.data
     data.qpos[2] = height * XPLORER.robot.height

@@ -1,4 +1,5 @@
-"""Craft on screws as scenes and by MuJoCo, against their balance in the mean over a turn."""
+"""Craft on screws as scenes and by MuJoCo, against their balance in the mean over a
+turn."""
 
 import dataclasses
 import re

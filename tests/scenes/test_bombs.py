@@ -1,5 +1,5 @@
-"""Small files that name the same thing many times, or hold far more than their bytes, are
-refused soon."""
+"""Small files that name the same thing many times, or hold far more than their bytes,
+are refused soon."""
 
 import struct
 import zlib

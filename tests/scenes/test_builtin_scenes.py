@@ -1,6 +1,6 @@
-"""The built-in scenes: what they say against their sources, and their displacement pinned
-to the digits found first and to an independent sum of forces over points, solved and
-integrated here from numbers written here."""
+"""The built-in scenes: what they say against their sources, and their displacement
+pinned to the digits found first and to an independent sum of forces over points, solved
+and integrated here from numbers written here."""
 
 import math
 
@@ -12,7 +12,8 @@ from geomech.studies.scene_tables import SceneTables
 from rft import CATALOGUE
 
 pytestmark = pytest.mark.usefixtures("fastest")
-# Net (x, y, theta) of a cycle of the scene's own gait by the direct tier at the scene's own numerics.
+# Net (x, y, theta) of a cycle of the scene's own gait by the direct tier at the scene's
+# own numerics.
 PINNED = {
     "butterfly-glass": (0.267792218, 0.0, 0.0),
     "differential-drive": (0.081690399, -0.264082852, 0.0),
@@ -37,8 +38,8 @@ PINNED = {
 @pytest.mark.parametrize("name", scenes.builtin_names())
 def test_displacement_is_pinned(name):
     expected = np.array(PINNED[name])
-    # Where drag builds up, 64 phases and pieces of 1 / 100 leave some 1e-3, whose digits
-    # are the scheme's.
+    # Where drag builds up, 64 phases and pieces of 1 / 100 leave some 1e-3, whose
+    # digits are the scheme's.
     fine = 5e-4 if name == "sandfish-transient" else 2e-5
     found = SceneTables(scenes.load(name)).poses("direct")
     np.testing.assert_allclose(found, expected, atol=fine * np.abs(expected).max())
@@ -63,8 +64,8 @@ def test_constants_of_the_scenes():
     assert slowed.system.effects[1].travel == pytest.approx(wave / 5, rel=0.01)
 
 
-# C and tan^2(gamma0) of Eq. 3; axial stress, Pa; drag across over that along, where it is
-# not 1.
+# C and tan^2(gamma0) of Eq. 3; axial stress, Pa; drag across over that along, where it
+# is not 1.
 CONSTANTS = {
     "glass-0.3mm-loose": (1.8, math.tan(math.radians(13.8)) ** 2, 2710.0),
     "glass-0.3mm-loose-fitted": (0.5108 / 0.2770, 4.0587**-2, 2770.0),
@@ -91,7 +92,8 @@ def test_constants_of_the_catalogue(name):
 
 
 def granular(C, gamma0_deg):
-    """Eq. 3 with its square root: drag along and across at velocity (a, u), rounded off below the speed eps."""
+    """Eq. 3 with its square root: drag along and across at velocity (a, u), rounded off
+    below the speed eps."""
     tan2 = math.tan(math.radians(gamma0_deg)) ** 2
 
     def law(a, u, eps):
@@ -182,7 +184,8 @@ def butterfly(t):
     return np.array([both + one, both - one])
 
 
-# name: law, headings(t), law of the head if it has one, link that carries the frame or None for the mean
+# name: law, headings(t), law of the head if it has one, link that carries the frame or
+# None for the mean
 INDEPENDENT = {
     "three-link-glass": (LOOSE, three_links(clockwise), None, None),
     "three-link-glass-close": (CLOSE, three_links(clockwise), None, None),

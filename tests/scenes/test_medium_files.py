@@ -1,5 +1,5 @@
-"""Media from files: what a calibration wrote, and tables of measured drag, whose curve is checked against the law
-behind it."""
+"""Media from files: what a calibration wrote, and tables of measured drag, whose curve
+is checked against the law behind it."""
 
 import math
 import re

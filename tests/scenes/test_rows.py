@@ -1,5 +1,6 @@
-"""Tables of other people: one table in the forms that spreadsheets, loggers, robots and trackers write it gives the
-same numbers, what is decided is told, and what cannot be decided is refused."""
+"""Tables of other people: one table in the forms that spreadsheets, loggers, robots and
+trackers write it gives the same numbers, what is decided is told, and what cannot be
+decided is refused."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Scenes: built-in ones run, bad ones are refused with one line that names the place and the cure."""
+"""Scenes: built-in ones run, bad ones are refused with one line that names the place
+and the cure."""
 
 import dataclasses
 import math
@@ -213,7 +214,8 @@ def test_a_large_field_converges_everywhere_in_little_memory():
     "name", scenes.builtin_names() + scenes.intruder_names() + scenes.walker_names()
 )
 def test_a_scene_written_from_its_parts_reads_the_same(name):
-    """Not from the text that it was read from; and its tables are a scene of the same parts."""
+    """Not from the text that it was read from; and its tables are a scene of the same
+    parts."""
     scene = dataclasses.replace(scenes.load(name), text="")
     text = scenes.toml(scene)
     assert text != scenes.load(name).text and scenes.parse(text, name) == scene

@@ -1161,7 +1161,8 @@ def two_kinds(kind, apart, share):
         ("abbaabbaabab", 0.2, 0.905, "line 26: two gaits: 6 cycles are of one kind and 6 of another, .* here .t = 1.02083.;"),
         ("abbaabbaabab", 0.2, 0.895, ""), ("aaaabbbbbbbb", 0.2, 0.805, "line 98: two gaits: [48] cycles .* and [48] of"),
         ("aaaabbbbbbbb", 0.2, 0.795, ""), ("aaaabbbbbbbb", -0.2, 0.805, "line 98: two gaits: [48] cycles .* and [48] of"),
-        ("aaaabbbbbbbb", 0.0525, 0.95, "two gaits"), ("aaaabbbbbbbb", 0.05, 0.95, ""),  # of a mean size of 1.035
+        # of a mean size of 1.035
+        ("aaaabbbbbbbb", 0.0525, 0.95, "two gaits"), ("aaaabbbbbbbb", 0.05, 0.95, ""),
         ("aabbaaaabb", 0.3, 0.97, "two gaits: 6 cycles"), ("aaaaaaaabb", 0.3, 0.97, ""), ("aabbb", 0.3, 0.97, ""),
         ("aaabbb", 0.3, 0.999, "two gaits: 3 cycles are of one kind and 3"), ("aaaaaabbb", 0.3, 0.98, "two gaits: [36] cycles"),
     ],

@@ -1,4 +1,5 @@
-"""Measured midlines: closed forms, files as trackers write them, slips that are refused, coverage of intervals."""
+"""Measured midlines: closed forms, files as trackers write them, slips that are
+refused, coverage of intervals."""
 
 import contextlib
 import dataclasses

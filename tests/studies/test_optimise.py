@@ -295,7 +295,8 @@ def test_best_gaits_in_sand_turn_no_more_than_the_scene_and_so_have_one_net_dist
 
 @dataclass(frozen=True)
 class Strips:
-    """Displacement is the area under 3 cos(3 alpha_1) + 0.2, so that each strip between its zeros has a best loop."""
+    """Displacement is the area under 3 cos(3 alpha_1) + 0.2, so that each strip between
+    its zeros has a best loop."""
 
     joints, traits, kind = 2, Traits(linear=True), "strips"
 

@@ -1,4 +1,5 @@
-"""A velocity of one's own that leaves word of the process which computes it, and waits there for a second one."""
+"""A velocity of one's own that leaves word of the process which computes it, and waits
+there for a second one."""
 
 import multiprocessing
 import os
@@ -34,5 +35,6 @@ def velocity(alpha, alphadot):
 
 
 def others():
-    """Processes that have computed, but for the script's, which does the first two parts."""
+    """Processes that have computed, but for the script's, which does the first two
+    parts."""
     return [*pathlib.Path().glob("process-*")][1:]

@@ -1,4 +1,5 @@
-"""A law of one's own that stops the command which computes it, as a signal or a fault would."""
+"""A law of one's own that stops the command which computes it, as a signal or a fault
+would."""
 
 import signal
 from dataclasses import dataclass
@@ -6,7 +7,8 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Stops:
-    """by (-): the number of a signal; 0 for a full memory, -1 for a fault of the program."""
+    """by (-): the number of a signal; 0 for a full memory, -1 for a fault of the
+    program."""
 
     by: int
     law = "stops"

@@ -1,4 +1,5 @@
-"""A field shared among two processes by a script that has no `if __name__ == "__main__"`."""
+"""A field shared among two processes by a script that has no `if __name__ ==
+"__main__"`."""
 
 import rolling
 
