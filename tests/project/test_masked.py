@@ -15,6 +15,7 @@ from rft.formulas import se2
 from rft.laws import LAWS
 from rft.laws.drag import rod_drag
 from rft.terradynamics import meshes, plates
+from rft.terradynamics.meshes.forces import law
 
 ANGLES = np.ma.array([0.5, 0.3], mask=[True, False])
 ROWS = np.ma.array(np.full((4, 2), 0.3), mask=np.eye(4, 2, dtype=bool))
@@ -53,7 +54,7 @@ CALLS = {
     "data": lambda: rod_drag(ANGLES, [1.0, 1.0], [1.0, 1.0]),
     "stress": lambda: plates.StressMap()(ANGLES, 0.5),
     "poses of a plate": lambda: plates.loads(plates.StressMap(), plates.Plate(0.1, 0.1), POSES, POSES),
-    "spatial stress": lambda: meshes.law.alpha_of_angles(ANGLES, 0.5, 0.5),
+    "spatial stress": lambda: law.alpha_of_angles(ANGLES, 0.5, 0.5),
     "vertices": lambda: meshes.Mesh(POSES, [[0, 1, 2]]),
 }  # fmt: skip
 CALLS |= {f"shape of {name}": lambda gait=gait: gait.shape(ANGLES) for name, gait in GAITS.examples().items()}  # fmt: skip
