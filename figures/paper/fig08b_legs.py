@@ -22,6 +22,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.integrate import trapezoid
 
 from figures import main, style
 from geomech import plots
@@ -68,7 +69,7 @@ def asymmetry(angle, force) -> float:
     (T,) symmetric about 0."""
     even = (force + force[::-1]) / 2
     odd = (force - force[::-1]) / 2
-    return float(np.sqrt(np.trapezoid(odd**2, angle) / np.trapezoid(even**2, angle)))
+    return float(np.sqrt(trapezoid(odd**2, angle) / trapezoid(even**2, angle)))
 
 
 def peaks(numbers: dict, name: str) -> dict:

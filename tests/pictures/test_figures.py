@@ -11,6 +11,7 @@ import sys
 import numpy as np
 import pytest
 from artists import curve, curves, drawn
+from scipy.integrate import trapezoid
 
 import figures
 from figures import style
@@ -310,8 +311,8 @@ def test_fig08a_stress_around_the_cylinder_is_that_on_plates():
         both = normal[2 * degrees], tangent[2 * degrees]
         assert both == pytest.approx((0.224 * n, 0.224 * t), abs=2e-5)
     # Their sum over the leading half is the force: one depth, grazing faces apart.
-    drag = np.trapezoid(normal * np.sin(beta) - tangent * np.cos(beta), beta)
-    lift = np.trapezoid(normal * np.cos(beta) + tangent * np.sin(beta), beta)
+    drag = trapezoid(normal * np.sin(beta) - tangent * np.cos(beta), beta)
+    lift = trapezoid(normal * np.cos(beta) + tangent * np.sin(beta), beta)
     ratio = found["rods"]["round"]["keep"]["ratio"]
     assert lift / drag == pytest.approx(ratio, abs=0.003)
 
