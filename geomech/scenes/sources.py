@@ -13,9 +13,10 @@ from collections.abc import Iterable, Iterator
 from importlib.machinery import PathFinder
 from pathlib import Path
 
-# Folders of the standard library and of installed packages.
-SCHEMES = ("stdlib", "platstdlib", "purelib", "platlib")
-INSTALLED = tuple({sysconfig.get_path(scheme) for scheme in SCHEMES})
+LIBRARY = tuple({sysconfig.get_path(name) for name in ("stdlib", "platstdlib")})
+# Folders of installed packages, wherever they are: of this environment, of the user, of
+# the system below an environment.
+PACKAGES = {"site-packages", "dist-packages"}
 # Digest of a module without a file, as of a notebook; no other process has it.
 UNKNOWN = secrets.token_hex()
 
@@ -101,4 +102,6 @@ def _is_own(module: str, packages: set[str]) -> bool:
         return False
     if package in packages:
         return True
-    return not any(Path(file).is_relative_to(folder) for folder in INSTALLED)
+    path = Path(file)
+    in_library = any(path.is_relative_to(folder) for folder in LIBRARY)
+    return not in_library and PACKAGES.isdisjoint(path.parts)

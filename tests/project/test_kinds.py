@@ -19,7 +19,7 @@ from geomech.core.entry_points import installed_entries
 from geomech.mathematics.gaits import Circle, Sine
 from geomech.mathematics.systems import Premise, Solver, Swimmer, capability
 from geomech.mathematics.systems.capabilities import Recorded
-from geomech.scenes import Numerics, Scene, kinds, load, parse, toml
+from geomech.scenes import Numerics, Scene, kinds, load, parse, sources, toml
 from geomech.scenes.format.keys import text
 from geomech.scenes.format.schema import schema
 from geomech.scenes.kinds import load_file
@@ -236,6 +236,21 @@ def test_digests_of_own_code_cover_its_sources(name, tmp_path, monkeypatch):
     assert not tops & {"rft", "geomech", "numpy"}
     assert found[0] == found[3]
     assert found[0] != found[1] != found[2] != found[0]
+
+
+@pytest.mark.parametrize("folder", ["site-packages", "dist-packages"])
+def test_digests_leave_out_installed_packages_of_any_environment(
+    folder, tmp_path, monkeypatch
+):
+    """Those of the user or of the system, below which an environment may stand."""
+    installed = tmp_path / "lib" / folder
+    installed.mkdir(parents=True)
+    (installed / "thick_installed.py").write_text("")
+    (tmp_path / "thick_own.py").write_text("import thick_installed, thick_near")
+    (tmp_path / "thick_near.py").write_text("")
+    monkeypatch.syspath_prepend(str(installed))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert {*sources.digests(["thick_own"], {})} == {"thick_own", "thick_near"}
 
 
 SCRIPT = """
