@@ -1,4 +1,5 @@
-"""The long description of the package: README.md, whose links within the repository are made absolute."""
+"""The long description of the package: README.md, whose links within the repository are
+made absolute."""
 
 import pathlib
 import re
@@ -7,7 +8,8 @@ from hatchling.metadata.plugin.interface import MetadataHookInterface
 
 
 def absolute(text: str, repository: str, version: str) -> str:
-    """Return Markdown whose relative links and pictures lead to the files of that version in the repository."""
+    """Return Markdown whose relative links and pictures lead to the files of that
+    version in the repository."""
 
     def link(match: re.Match) -> str:
         picture, label, target = match.groups()

@@ -1,7 +1,8 @@
 """What the site computes while it is built: reference pages, numbers, and pictures.
 
-A page asks for it by an empty block of code, ```{made} NAME, which is replaced by the Markdown that the function of that
-name returns. Blocks of the gallery's pages are run, and their pictures shown.
+A page asks for it by an empty block of code, ```{made} NAME, which is replaced by the
+Markdown that the function of that name returns. Blocks of the gallery's pages are run,
+and their pictures shown.
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ MADE = {
 
 
 def fill_in(app, docname: str, source: list[str]) -> None:
-    """Replace the blocks {made} of a page, and add what its commands print, or the pictures of the gallery."""
+    """Replace the blocks {made} of a page, and add what its commands print, or the
+    pictures of the gallery."""
     if docname.startswith("gallery/") and docname not in (
         "gallery/index",
         "gallery/figures",

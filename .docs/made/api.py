@@ -1,4 +1,5 @@
-"""The Python reference: a page for each public package, from `__all__` and docstrings, whose examples are run."""
+"""The Python reference: a page for each public package, from `__all__` and docstrings,
+whose examples are run."""
 
 from __future__ import annotations
 
@@ -80,7 +81,8 @@ def write(folder: Path) -> None:
 
 
 def readable(app, what: str, name: str, obj, options, lines: list[str]) -> None:
-    """Turn a docstring of plain sentences into reStructuredText: |x| is no substitution, and a table stays as it is."""
+    """Turn a docstring of plain sentences into reStructuredText: |x| is no
+    substitution, and a table stays as it is."""
 
     def escaped(some):
         return [re.sub(r"(``.*?``)|\|", lambda x: x[1] or r"\|", line) for line in some]
@@ -111,7 +113,8 @@ def readable(app, what: str, name: str, obj, options, lines: list[str]) -> None:
 def plain_types(
     app, what: str, name: str, obj, options, signature: str | None, returned: str | None
 ):
-    """Drop bounds and meanings from the types of a signature, as they stand in the list of parameters."""
+    """Drop bounds and meanings from the types of a signature, as they stand in the list
+    of parameters."""
     return tuple(text and _without_annotations(text) for text in (signature, returned))
 
 
@@ -137,7 +140,8 @@ def _without_annotations(text: str) -> str:
 
 
 def with_parameters(app, what: str, name: str, obj, options, lines: list[str]) -> None:
-    """Add the list of parameters of a class whose fields are annotated with bounds, unit and meaning."""
+    """Add the list of parameters of a class whose fields are annotated with bounds,
+    unit and meaning."""
     if (
         what != "class"
         or not (numbers := number_fields(obj))
@@ -217,7 +221,8 @@ def _page(name: str) -> str:
 
 
 def _home(name: str, value) -> bool:
-    """Return whether the page of a package is the one of all pages that documents an object it offers."""
+    """Return whether the page of a package is the one of all pages that documents an
+    object it offers."""
     module = getattr(value, "__module__", name)
     pages = [
         page
@@ -256,7 +261,8 @@ def _nowhere_else(module) -> list[str]:
 
 
 def wrong_examples() -> list[str]:
-    """Run the examples of all docstrings in the reference; return what those print that end otherwise than shown."""
+    """Run the examples of all docstrings in the reference; return what those print that
+    end otherwise than shown."""
     objects: dict[int, tuple[str, object]] = {}
     for page in _pages():
         module = _imported(page)

@@ -9,7 +9,8 @@ from geomech.shell import cli
 
 
 def page() -> str:
-    """Return a heading for each group of `geomech --help`, and for each command its usage, text and options."""
+    """Return a heading for each group of `geomech --help`, and for each command its
+    usage, text and options."""
     commands = cli.Commands()
     parts = []
     for heading, names in cli.headings().items():

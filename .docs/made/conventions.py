@@ -10,7 +10,8 @@ TARGET = Path(__file__).parents[1] / "generated" / "alpha.svg"
 
 
 def drawing() -> str:
-    """Draw three links with alpha_1, alpha_2 and the body frame; return the Markdown that shows it."""
+    """Draw three links with alpha_1, alpha_2 and the body frame; return the Markdown
+    that shows it."""
     from matplotlib.figure import Figure
 
     import geomech
@@ -70,7 +71,8 @@ def drawing() -> str:
 
 
 def _angle(ax, joint, before: float, after: float, name: str, colour: str) -> None:
-    """Draw the straight continuation of a link, the arc from it to the next link, and the angle's name."""
+    """Draw the straight continuation of a link, the arc from it to the next link, and
+    the angle's name."""
     radius, angles = 0.13, np.linspace(before, after, 40)
     ray = joint + 0.2 * np.array([[0, 0], [np.cos(before), np.sin(before)]])
     ax.plot(*ray.T, ":", color=colour, lw=1.4)

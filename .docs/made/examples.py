@@ -1,8 +1,10 @@
 """Blocks of code that the build runs.
 
-On any page, ```LANGUAGE FILE is a file of that name. The commands of a block ```console, `$ ` before each, are run in the
-folder of the page's files, after its programs, and followed by what they print. On a page of the gallery the commands of
-a block ```sh and the programs of a block ```python are run, the picture of the command is shown, and the scene is added.
+On any page, ```LANGUAGE FILE is a file of that name. The commands of a block
+```console, `$ ` before each, are run in the folder of the page's files, after its
+programs, and followed by what they print. On a page of the gallery the commands of a
+block ```sh and the programs of a block ```python are run, the picture of the command is
+shown, and the scene is added.
 """
 
 from __future__ import annotations
@@ -24,7 +26,8 @@ LONGEST = 40  # lines of output that a page shows
 
 
 def run(code: str, folder: Path, program: bool = False) -> str:
-    """Return what a program, or commands, print in a folder; RuntimeError where they fail."""
+    """Return what a program, or commands, print in a folder; RuntimeError where they
+    fail."""
     command = (
         [sys.executable, "-c", code] if program else ["bash", "-euc", SHELL + code]
     )
@@ -64,7 +67,8 @@ def _shown(block: re.Match, folder: Path) -> str:
 
 
 class Example:
-    """One section of a page of the gallery: title, text, command, own scene, program."""
+    """One section of a page of the gallery: title, text, command, own scene,
+    program."""
 
     def __init__(self, page: str, text: str):
         self.page, self.title = page, text.partition("\n")[0].strip()
@@ -120,7 +124,8 @@ class Example:
 
 
 def sections(page: Path) -> tuple[str, list[Example]]:
-    """Return what stands before the first section of a page of the gallery, and its sections."""
+    """Return what stands before the first section of a page of the gallery, and its
+    sections."""
     head, *parts = re.split(r"(?m)^## ", page.read_text(encoding="utf-8"))
     return head, [Example(page.stem, part) for part in parts]
 

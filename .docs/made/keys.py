@@ -6,7 +6,8 @@ from geomech.scenes.format import keys
 
 
 def page() -> str:
-    """Return a heading for each section, a heading for each of its kinds, and a table of its keys."""
+    """Return a heading for each section, a heading for each of its kinds, and a table
+    of its keys."""
     return "\n\n".join(_section(name, parts) for name, parts in keys.sections().items())
 
 

@@ -1,4 +1,5 @@
-"""The table of validation: numbers that geomech gives beside those of others, computed while the site is built.
+"""The table of validation: numbers that geomech gives beside those of others, computed
+while the site is built.
 
 `python .docs/made/validation.py` prints the table alone.
 """
@@ -40,7 +41,8 @@ def table() -> str:
 
 
 def viscous_geometry():
-    """Yield the CCF and the area of the viscous swimmer in its minimum-perturbation frame, and its true displacement."""
+    """Yield the CCF and the area of the viscous swimmer in its minimum-perturbation
+    frame, and its true displacement."""
     study = geomech.Study(
         geomech.load("three-link-viscous").with_numerics(grid=31, extent=2.5)
     ).tables
@@ -72,7 +74,8 @@ def viscous_geometry():
 
 
 def viscous_cost():
-    """Yield the dissipation metric of the straight viscous swimmer and the path length of a circle."""
+    """Yield the dissipation metric of the straight viscous swimmer and the path length
+    of a circle."""
     study = geomech.Study(geomech.load("three-link-viscous")).tables
     M = study.metric.field([0.0, 0.0])
     source = (
@@ -103,7 +106,8 @@ CLOSED = "connection in closed form by sympy, integrated by SciPy to 1e-12"
 
 
 def closed_distance() -> float:
-    """Return the net distance of the viscous swimmer on the circle of 1 rad, without a balance of forces."""
+    """Return the net distance of the viscous swimmer on the circle of 1 rad, without a
+    balance of forces."""
     xi = velocity(*viscous_chain())
 
     def rate(t, pose):
@@ -118,7 +122,8 @@ def closed_distance() -> float:
 
 
 def closed_path_length() -> float:
-    """Return the path length of the same circle: sqrt(power) by the drag of links on their velocities J A + B."""
+    """Return the path length of the same circle: sqrt(power) by the drag of links on
+    their velocities J A + B."""
     A, alpha = viscous_chain()
     third = sp.Rational(1, 3)
     drag = sp.diag(
