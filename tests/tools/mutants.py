@@ -1,16 +1,17 @@
 """Small bugs put into the code on purpose, to see whether a test notices. By hand, not
 collected by pytest:
 
-    python tests/tools/mutants.py calls.txt --measure python tests/tools/mutants.py
-    calls.txt --count 200 --seed 1 --jobs 2 [--only rft/laws rft/bodies] python
-    tests/tools/mutants.py calls.txt --count 200 --seed 1 --map map.jsonl python
-    tests/tools/mutants.py calls.txt --needed map.jsonl
+    python tests/tools/mutants.py calls.txt --measure
+    python tests/tools/mutants.py calls.txt --count 200 --seed 1 --jobs 2
+    python tests/tools/mutants.py calls.txt --count 200 --seed 1 --map map.jsonl
+    python tests/tools/mutants.py calls.txt --needed map.jsonl
 
 The first line runs the suite and the examples of docstrings once and notes which
 functions each test calls, and its seconds. A mutant then meets the tests that call the
 function in which it stands (of a constant: any of its class, file or folder), quickest
-first, and as far as `ENOUGH` seconds go, the rest of their files, which may look at
-what a fixture or a cache holds. `mutants.toml` beside this file names the tests of what
+first, and as far as `--enough` seconds go, the rest of their files, which may look at
+what a fixture or a cache holds. Tests deleted since the measurement are left out; of
+tests added since nothing is known. `mutants.toml` beside this file names the tests of what
 Python does not see called, what is left out and which mutants are no bugs. Mutants live
 in copies of the tree in the system's temporary folder, one a worker; the checkout is
 only read. A mutant is killed when a test fails; time-outs, far longer than without it,
@@ -54,7 +55,6 @@ TABLE = tomllib.loads((ROOT / "tests/tools/mutants.toml").read_text())
 # In one process and without time limits of its own, whatever the suite's settings are.
 PYTEST = ["-q", "--doctest-modules", "--assert=plain", "-p", "no:cacheprovider"]
 PYTEST += ["-o", "addopts=", "-o", "timeout=0", "-m", "not soak and not benchmark"]
-ENOUGH = 60  # s of CPU that the tests of one mutant may take
 # Loaded once, before each mutant's process splits off.
 HEAVY = "pytest numpy scipy.interpolate scipy.special scipy.stats sympy mpmath matplotlib.pyplot xarray"
 CLEAN = {
@@ -285,15 +285,27 @@ class Calls:
 class Watch:
     """The tests that watch a mutant, from a file that `Calls` wrote."""
 
-    def __init__(self, file: Path):
-        self.seconds, self.calling = (
-            {},
-            collections.defaultdict(set),
-        )  # by test; and tests by place
+    def __init__(self, file: Path, enough: float = 60.0):
+        """``enough`` is the CPU time in s that the tests of one mutant may take."""
+        self.enough = enough
+        self.seconds = {}  # by test
+        self.calling = collections.defaultdict(set)  # tests by place
         for line in file.open():
             test, self.seconds[test], calls = json.loads(line)
             for place in {place for call in calls for place in outwards(call)}:
                 self.calling[place].add(test)
+
+    def keep(self, tests: set[str]) -> int:
+        """Forget all tests but these, and return how many are forgotten."""
+        gone = self.seconds.keys() - tests
+        for test in gone:
+            del self.seconds[test]
+        self.calling = {
+            place: calling - gone
+            for place, calling in self.calling.items()
+            if calling - gone
+        }
+        return len(gone)
 
     def over(self, m: Mutant) -> list[str]:
         """The tests to be run on a mutant, file by file, the quickest first."""
@@ -307,7 +319,7 @@ class Watch:
         for test in sorted(
             every, key=lambda test: (test not in near, self.seconds[test])
         ):
-            if sums.total() < ENOUGH:
+            if sums.total() < self.enough:
                 some.append(test)
                 sums[file_of(test)] += self.seconds[test]
         return sorted(some, key=lambda test: (sums[file_of(test)], file_of(test)))
@@ -365,6 +377,19 @@ def copied(tree: Path) -> Path:
         (tree / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, tree / name)
     return tree
+
+
+class Listed:
+    """A plugin of pytest that writes which tests there are."""
+
+    def __init__(self, file: Path):
+        self.file = file
+        file.write_text("")
+
+    def pytest_collection_modifyitems(self, items):
+        with self.file.open("a") as file:
+            for item in items:
+                print(item.nodeid, file=file)
 
 
 class Failures:
@@ -438,9 +463,14 @@ def hunted(
         {},
         iter(some),
     )
-    tests = sorted({test for m in some for test in watch.over(m)})
-    if os.waitpid(start(trees[0], tests, 600, "--collect-only"), 0)[1]:
-        sys.exit("there are other tests now: --measure anew")
+    listed = Listed(folder / "tests.txt")
+    child = start(
+        trees[0], ["tests", *PACKAGES], 600, "--collect-only", plugins=[listed]
+    )
+    os.waitpid(child, 0)
+    gone = watch.keep({*listed.file.read_text().splitlines()})
+    if gone:
+        print(f"{gone} of the tests measured are gone", flush=True)
     while (m := next(todo, None)) or running:
         if m:
             tree, tests = trees.pop(), watch.over(m)
@@ -492,7 +522,8 @@ def report(asked: argparse.Namespace, folder: Path) -> None:
         (x["file"], x["change"].strip()): x["why"] for x in TABLE.get("equivalent", ())
     }
     counts = collections.Counter()
-    for m, outcome in hunted(some, Watch(asked.calls), folder, asked.jobs, asked.map):
+    watch = Watch(asked.calls, asked.enough)
+    for m, outcome in hunted(some, watch, folder, asked.jobs, asked.map):
         why = known.get((m.file, m.change())) if outcome == "survived" else None
         counts["no bug" if why else outcome] += 1
         more = (
@@ -524,6 +555,13 @@ def main() -> None:
     )
     ask.add_argument("--jobs", type=int, default=2)
     ask.add_argument("--only", nargs="+", default=[""], help="beginnings of file names")
+    ask.add_argument(
+        "--enough",
+        type=float,
+        default=60.0,
+        metavar="S",
+        help="CPU time in s that the tests of one mutant may take",
+    )
     ask.add_argument("--rooms", nargs="+", default=[], help="folders of tests/")
     ask.add_argument("--map", type=Path, help="add which tests notice each mutant")
     ask.add_argument("--needed", nargs="+", type=Path, help="read such maps")
