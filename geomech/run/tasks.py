@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 from geomech.run.backend import VERSION, one_thread, preferring
+from geomech.run.threads import one_blas_thread
 from geomech.scenes import kinds
 from rft.core.refusal import Refusal
 
@@ -87,9 +88,10 @@ def pack(task: Callable, common: Any, back_end: str) -> TaskPayload:
 def compute(
     task: Callable, common: Any, item: Any, back_end: str, one_of_many: bool = True
 ) -> Any:
-    """Return task(common, item), computed as in a worker. The only task of a request
-    may use all threads."""
+    """Return task(common, item), computed as in a worker. The solver may use all
+    threads for the only task of a request, and BLAS never more than one."""
     with contextlib.ExitStack() as stack:
+        stack.enter_context(one_blas_thread())
         if one_of_many:
             stack.enter_context(one_thread())
         stack.enter_context(preferring(back_end))

@@ -192,9 +192,14 @@ class Question(Plain):
 
     def ask(self, tables: Any = None) -> "Result":
         """Return the answer without limits of cost, as from Python. tables: of the
-        scene, if there are some already."""
+        scene, if there are some already.
+
+        BLAS takes one thread meanwhile, as it does in a command."""
+        from geomech.run.threads import one_blas_thread
+
         self.check()
-        return self.answer(Run(self.progress or ignore, tables=tables))
+        with one_blas_thread():
+            return self.answer(Run(self.progress or ignore, tables=tables))
 
     def _set(self, **values: Any) -> None:
         """Set fields in `__post_init__`."""
