@@ -250,8 +250,36 @@ class Rows:
         names = columns if selected is None else selected
         return self._numbers_at([[*columns].index(name) for name in names])
 
+    def plain_numbers(self, indices: Sequence[int]) -> np.ndarray | None:
+        """Return the numbers (N, k) in k columns of the file, read by NumPy in a tenth
+        of the time; None where a row has anything else, which the caller reads cell by
+        cell, to say where it is."""
+        texts = [text for _, text in self.rows]
+        separators = len(self.words) - 1
+        if self.separator == " " or self.decimal != "." or not texts or not indices:
+            return None
+        for text in texts:
+            if text.count(self.separator) != separators or '"' in text:
+                return None
+        try:
+            values = np.loadtxt(
+                texts,
+                delimiter=self.separator,
+                usecols=indices,
+                comments=None,
+                ndmin=2,
+            )
+        except ValueError:
+            return None
+        if not (np.abs(values) <= LARGEST_NUMBER).all():
+            return None
+        return values
+
     def _numbers_at(self, indices: list[int]) -> np.ndarray:
         """Return the numbers (N, k) in k columns of the file."""
+        plain = self.plain_numbers(indices)
+        if plain is not None:
+            return plain
         values = [self._row_at(line, text, indices) for line, text in self.rows]
         return np.array(values).reshape(-1, len(indices))
 
@@ -279,6 +307,9 @@ class Rows:
 
         unit: that the header names, or "". Times since 1970 are recognised by their
         size, and are counted from the first row."""
+        plain = self.plain_numbers([index])
+        if plain is not None and not _unit_since_1970(plain[0, 0], unit):
+            return plain[:, 0] * UNITS["time"].get(unit, 1.0), ""
         cells = self._time_cells(index)
         word = self.words[index]
         first = self.number(cells[0]) if cells else 0.0

@@ -33,8 +33,9 @@ __all__ = [
 
 VERSION = f"geomech {version.VERSION}, solver {SOLVER}"
 BACKENDS = ("numpy", "numba")  # slowest first
-# Balances that take NumPy about as long as compiled code takes to load.
-WORTH_LOADING = 100_000
+# Seconds of balances by NumPy, as `geomech.run.cost` assumes them, about as long as
+# compiled code takes to load.
+WORTH_LOADING = 1.5
 
 _limit: ContextVar[str] = ContextVar("limit", default="numba")
 
@@ -55,16 +56,16 @@ def at_most(name: str) -> Iterator[None]:
         _limit.reset(token)
 
 
-def prefer_backend(balances: float) -> contextlib.AbstractContextManager[None]:
-    """Let "auto" be the fastest back end in the body of the statement if this number of
-    balances is worth its start."""
-    if balances < WORTH_LOADING:
+def prefer_backend(numpy_seconds: float) -> contextlib.AbstractContextManager[None]:
+    """Let "auto" be the fastest back end in the body of the statement if balances that
+    are assumed to take NumPy so long are worth its start."""
+    if numpy_seconds < WORTH_LOADING:
         return preferring("")
     return preferring(fastest())
 
 
-def prefer_for(balances: float) -> None:
-    """Let "auto" be the fastest back end from here on if this number of balances is
-    worth its start."""
-    if balances >= WORTH_LOADING:
+def prefer_for(numpy_seconds: float) -> None:
+    """Let "auto" be the fastest back end from here on if balances that are assumed to
+    take NumPy so long are worth its start."""
+    if numpy_seconds >= WORTH_LOADING:
         prefer(fastest())

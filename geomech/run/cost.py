@@ -35,8 +35,6 @@ LOADING = 20.0
 BALANCE = {"numpy": 5e-6, "numba": 0.8e-6}
 LINEAR = 0.1  # times BALANCE, in a linear medium
 BATCH = {"numpy": 2e-3, "numba": 5e-4}  # s for each batch of balances, however small
-# Balances of large batches that take NumPy as long as one small batch.
-STEP = 200
 
 
 class TooLong(Refusal):
@@ -48,26 +46,21 @@ class Cost(NamedTuple):
     """Cost of a request.
 
     balances: number of balances of force. seconds: of computing, ``besides`` of which
-    are other work. memory: bytes at the peak. steps: of time, in which balances are
-    solved one after the other."""
+    are other work. memory: bytes at the peak. numpy_seconds: that the balances are
+    assumed to take NumPy, by which the back end is chosen; 0 where it does not
+    matter."""
 
     balances: int
     seconds: float
     memory: float
     besides: float = 0.0
-    steps: float = 0.0
+    numpy_seconds: float = 0.0
 
     def __str__(self) -> str:
         balances = f"{self.balances:,} force balances"
         seconds = duration(self.seconds)
         memory = _size(self.memory)
         return f"{balances}, about {seconds} of computing and {memory} of memory"
-
-    @property
-    def as_balances(self) -> float:
-        """Number of balances that take NumPy about as long, for the choice of a back
-        end."""
-        return self.balances + STEP * self.steps
 
     @property
     def small(self) -> bool:

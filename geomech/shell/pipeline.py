@@ -132,8 +132,8 @@ def takes_time(question: Question) -> bool:
 def allow(question: Question, cost: Cost, yes: bool) -> None:
     """Print the cost of a question if it takes long; Refusal, with what to do instead,
     if it takes too long to begin without --yes: here, or in its first second
-    (`geomech.run.cost.decide`). From here on "auto" is the back end for that many
-    balances."""
+    (`geomech.run.cost.decide`). From here on "auto" is the back end that its balances
+    are worth."""
     name = question.subject_name
 
     def judge(cost: Cost) -> None:
@@ -141,7 +141,7 @@ def allow(question: Question, cost: Cost, yes: bool) -> None:
         if not cost.small or cost.seconds >= question.report_above:
             terminal.report(f"{name}: {cost}")
 
-    prefer_for(cost.as_balances)
+    prefer_for(cost.numpy_seconds)
     decide(cost, judge)
     note_system(question)
 

@@ -346,7 +346,7 @@ def test_the_back_end_does_not_depend_on_what_a_store_holds():
 
     def chosen(steps):
         prefer("numpy")
-        prefer_for(grains.GrainSteps(steps, steps / grains.RATE, 0.0).as_balances)
+        prefer_for(grains.GrainSteps(steps, steps / grains.RATE, 0.0).numpy_seconds)
         return preferred()
 
     first, resumed = (contextvars.copy_context().run(chosen, n) for n in (10**12, 0))

@@ -128,15 +128,17 @@ def test_no_faster_back_end_is_taken_than_at_first(tmp_path):
         stopped(tmp_path / "p", 2, calls)
     with backend.preferring("numba"), store_results(tmp_path / "p"):
         assert backend.preferred() == "numpy"
-        allow(Trajectory(VISCOUS), Cost(10**6, 1.0, 0.0), yes=True)
+        cost = Cost(10**6, 1.0, 0.0, numpy_seconds=5.0)
+        allow(Trajectory(VISCOUS), cost, yes=True)
         assert backend.preferred() == "numpy"
 
 
 @pytest.mark.parametrize("seconds", [0.1, 50.0])
-def test_a_count_of_balances_decides_on_the_back_end_and_no_clock(seconds):
-    for balances, expected in ((99_999, "numpy"), (100_000, backend.fastest())):
+def test_assumed_seconds_decide_on_the_back_end_and_no_clock(seconds):
+    for assumed, expected in ((1.49, "numpy"), (1.5, backend.fastest())):
         with backend.preferring("numpy"):
-            allow(Trajectory(VISCOUS), Cost(balances, seconds, 0.0), yes=True)
+            cost = Cost(1, seconds, 0.0, numpy_seconds=assumed)
+            allow(Trajectory(VISCOUS), cost, yes=True)
             assert backend.preferred() == expected
 
 

@@ -8,6 +8,7 @@ from geomech import scenes
 from geomech.questions.swimmers.sweep import Sweep
 from geomech.run import cost as run_cost
 from geomech.run import runner as runners
+from geomech.run.backend import WORTH_LOADING
 from geomech.run.cost import Cost, assumed_seconds, decide, is_undecided
 from geomech.studies.scene_tables import SceneTables
 from rft.balance.backend import preferring
@@ -98,12 +99,17 @@ def test_what_is_decided_next_is_not_told_by_what_was_to_be_before(clock):
     assert judged == ["second"]
 
 
-def test_a_step_of_time_weighs_as_much_as_many_balances_of_a_batch():
-    """NumPy takes a batch's time for it."""
+def test_compiled_code_is_loaded_where_numpy_takes_long():
+    """A step of time takes NumPy as long as many balances at once; a viscous balance
+    takes it a tenth of the time of a dry one."""
     marched = SceneTables(scenes.load("sandfish-transient")).cost([0.2], ["direct"])
-    assert marched.steps > 500
-    assert marched.as_balances == marched.balances + 200 * marched.steps
-    assert SceneTables(VISCOUS).cost([0.2], ["direct"]).steps == 0
+    assert marched.balances < 20_000 and marched.numpy_seconds > WORTH_LOADING
+    counts = []
+    for name in ("three-link-viscous", "three-link-glass"):
+        amplitudes = np.linspace(0.1, 1.0, 1000)
+        cost = SceneTables(scenes.load(name)).cost(amplitudes, ["direct"])
+        counts.append(cost.numpy_seconds / cost.balances)
+    assert counts[1] > 5 * counts[0]
 
 
 @pytest.mark.parametrize(

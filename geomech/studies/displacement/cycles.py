@@ -77,11 +77,15 @@ class Cycles:
             one_batch = direct_jobs(scene, gait, min(total, BATCH_SIZE), phases)
             memories.append(one_batch[0].memory)
 
-        balances, seconds, _, besides, steps = np.mean(costs, 0).tolist()
+        balances, seconds, _, besides, numpy_seconds = np.mean(costs, 0).tolist()
         building = SECONDS_PER_SCENE * n_points
         memory = max(memories) + BYTES_PER_POINT * total
         return Cost(
-            round(balances), seconds + building, memory, besides + building, steps
+            round(balances),
+            seconds + building,
+            memory,
+            besides + building,
+            numpy_seconds,
         )
 
     def variables(

@@ -68,25 +68,31 @@ class Job(NamedTuple):
     besides: float = 0.0
     memory: float = BASE
 
+    def seconds(self, back_end: str = "") -> float:
+        """Return the seconds that its balances are assumed to take the preferred back
+        end, or another."""
+        system = self.scene.system
+        points = balance_size(system).evaluations
+        return assumed_seconds(
+            self.weight * self.count,
+            points,
+            system.traits.linear,
+            self.batches,
+            back_end,
+        )
+
 
 def total_cost(jobs: Sequence[Job]) -> Cost:
     """Return the cost of jobs that run one after the other."""
     count = math.ceil(sum(job.count for job in jobs))
-    steps = sum(job.batches for job in jobs if job.scene.system.traits.steps)
-    seconds = 0.0
-    besides = sum(job.besides for job in jobs)
-    with prefer_backend(Cost(count, 0.0, 0.0, steps=steps).as_balances):
-        for job in jobs:
-            system = job.scene.system
-            if solver_of(system) is None:
-                besides += SECONDS_PER_CLOSED_FORM * job.count
-            else:
-                points = balance_size(system).evaluations
-                seconds += assumed_seconds(
-                    job.weight * job.count, points, system.traits.linear, job.batches
-                )
+    solved = [job for job in jobs if solver_of(job.scene.system) is not None]
+    n_closed = sum(job.count for job in jobs) - sum(job.count for job in solved)
+    besides = sum(job.besides for job in jobs) + SECONDS_PER_CLOSED_FORM * n_closed
+    numpy_seconds = sum(job.seconds("numpy") for job in solved)
+    with prefer_backend(numpy_seconds):
+        seconds = sum(job.seconds() for job in solved) + besides
     memory = max((job.memory for job in jobs), default=BASE)
-    return Cost(count, seconds + besides, memory, besides, steps)
+    return Cost(count, seconds, memory, besides, numpy_seconds)
 
 
 def study_jobs(

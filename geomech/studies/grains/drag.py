@@ -34,12 +34,11 @@ Progress = Callable[[float], None]
 
 
 class GrainSteps(Cost):
-    """Cost of grains; balances counts the steps of all grains."""
+    """Cost of grains; balances counts the steps of all grains.
 
-    # Grains solve no balances of forces. If their remaining steps counted, which depend
-    # on the store, so would the back end of the tiers beside them, and their last
-    # digits.
-    as_balances = 0.0
+    They solve no balances of forces, and ``numpy_seconds`` is 0. If their remaining
+    steps counted, which depend on the store, so would the back end of the tiers beside
+    them, and their last digits."""
 
     def __str__(self) -> str:
         seconds = duration(self.seconds)

@@ -162,8 +162,8 @@ class GrainSwim:
         """Return the displacement by every tier and in grains, and the motion in
         time."""
         # Before the grains: a scene that no tier takes is refused at once.
-        balances = SceneTables(self.scene).cost([self.scene.gait.amplitude]).as_balances
-        with prefer_backend(balances):
+        cost = SceneTables(self.scene).cost([self.scene.gait.amplitude])
+        with prefer_backend(cost.numpy_seconds):
             by_tier = predictions(self)
         run = self.experiment.run(store_folder(self.store), progress)
         return swim_result(self, run, by_tier)

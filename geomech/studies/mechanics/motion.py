@@ -235,7 +235,7 @@ def summed(parts: Sequence[Cost]) -> Cost:
         seconds=sum(part.seconds for part in parts),
         memory=max(part.memory for part in parts),
         besides=sum(part.besides for part in parts),
-        steps=sum(part.steps for part in parts),
+        numpy_seconds=sum(part.numpy_seconds for part in parts),
     )
 
 

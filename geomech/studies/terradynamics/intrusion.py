@@ -32,8 +32,7 @@ TOLERANCES = 10.0 ** -np.arange(1, 7)  # over the largest force and moment
 # Factor on the extrapolation by order: covers the error of 95 of 100 motions of
 # outlines, measured.
 MARGIN = 1.125
-# Elements that take as long as a balance.
-ELEMENTS_PER_BALANCE = 150
+NUMPY_SECONDS = 1e-7  # that an element is assumed to take NumPy
 
 
 def cost(scene: Intruding) -> Elements:
@@ -213,14 +212,6 @@ class Elements(Cost):
 
     parts = "elements"
 
-    @property
-    def as_balances(self) -> float:
-        """Number of balances that take NumPy as long; none for triangles, which are
-        never compiled."""
-        if self.parts == "elements":
-            return self.balances / ELEMENTS_PER_BALANCE
-        return 0.0
-
     def __str__(self) -> str:
         seconds = max(1.0, self.seconds)
         parts = f"{self.balances:,} {self.parts}"
@@ -228,7 +219,7 @@ class Elements(Cost):
 
 
 class Triangles(Elements):
-    """Cost of forces on a mesh along a motion."""
+    """Cost of forces on a mesh along a motion; its balances count triangles."""
 
     parts = "triangles"
 
@@ -237,5 +228,6 @@ def total_cost(scene: Intruding, count: int) -> Elements:
     """Return the cost of runs along a scene's motion with ``count`` parts in all."""
     parts = scene.motion.samples * count
     seconds = parts * scene.per_part
-    kind = Triangles if scene.parts == Triangles.parts else Elements
-    return kind(parts, seconds, BASE, seconds)
+    if scene.parts == Triangles.parts:  # which are never compiled
+        return Triangles(parts, seconds, BASE, seconds)
+    return Elements(parts, seconds, BASE, seconds, NUMPY_SECONDS * parts)

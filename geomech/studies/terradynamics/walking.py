@@ -32,10 +32,10 @@ PILOT = 0.05  # s of time steps that are timed
 STATUSES = ("walking", "stuck", "sunk", "flipped", "airborne")
 BATCH = 32  # robots
 SETTLING = 3  # cycles from rest in a sweep, before the limit cycle is looked for
-# Balances that take NumPy as long as a time step in the plane, and as one in three
-# dimensions, 55 ms.
-BALANCES_PER_STEP = 200.0
-BALANCES_PER_STEP_IN_SPACE = 11_000.0
+# Seconds that a time step is assumed to take NumPy, in the plane and in three
+# dimensions.
+STEP = 3e-3
+STEP_IN_SPACE = 0.165
 # Evaluations of forces in a step; the first steps of the built-in robots take 7 to 14.
 MANY_EVALUATIONS = 30.0
 LEG_ACCELERATION = 0.2  # of a body by much faster legs, over gravity, measured
@@ -272,14 +272,7 @@ def motion(run: Walked) -> list[Variable]:
 
 
 class WalkCost(Cost):
-    """Cost of walking: balances counts the time steps, steps those in three
-    dimensions."""
-
-    @property
-    def as_balances(self) -> float:
-        """Number of balances that take NumPy as long."""
-        planar = self.balances - self.steps
-        return BALANCES_PER_STEP * planar + BALANCES_PER_STEP_IN_SPACE * self.steps
+    """Cost of walking: balances counts the time steps."""
 
     def __str__(self) -> str:
         seconds = duration(self.seconds)
@@ -311,8 +304,8 @@ def walk_cost(
     error_cycles = LIMIT * sum(refined.cost for refined in chosen.variations(numerics))
 
     fewest_steps = (cycles + error_cycles) * numerics.steps * count
-    step_balances = BALANCES_PER_STEP if planar else BALANCES_PER_STEP_IN_SPACE
-    with located(scene.name), prefer_backend(step_balances * fewest_steps):
+    numpy_step = STEP if planar else STEP_IN_SPACE
+    with located(scene.name), prefer_backend(numpy_step * fewest_steps):
         walkers = [scene.walker] * batch
         step_seconds, evaluations = chosen.step_cost(walkers, numerics, PILOT)
 
@@ -325,8 +318,7 @@ def walk_cost(
     batches = -(-count // batch)
     seconds = step_seconds * steps * batches
     total = round(steps * count)
-    in_space = 0.0 if planar else total
-    return WalkCost(total, seconds, BASE, seconds, in_space)
+    return WalkCost(total, seconds, BASE, seconds, numpy_step * total)
 
 
 def _accelerating_cycles(scene: WalkerScene) -> float:
@@ -425,8 +417,8 @@ class Settings:
         one = walk_cost(self.scene, settling=True)
         seconds = one.seconds * shares / 2
         balances = round(one.balances * shares / 2)
-        steps = round(one.steps * shares / 2)
-        return WalkCost(balances, seconds, BASE, seconds, steps)
+        numpy_seconds = one.numpy_seconds * shares / 2
+        return WalkCost(balances, seconds, BASE, seconds, numpy_seconds)
 
     def with_shared_data(self) -> Settings:
         scene = self.scene

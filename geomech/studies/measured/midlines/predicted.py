@@ -12,12 +12,15 @@ import numpy as np
 
 from geomech.mathematics.geometry.reconstruct import displacement
 from geomech.mathematics.systems import Swimmer
+from geomech.run.backend import prefer_backend
+from geomech.run.cost import assumed_seconds
 from geomech.studies.measured.midlines import intervals, kinematics, smooth
 from geomech.studies.measured.midlines.fit import Kinematics
 from geomech.studies.measured.midlines.kinematics import PHASES, QUANTITIES
 from rft import Backbone
 from rft.core.checks import number_fields
 from rft.core.refusal import Refusal
+from rft.motion.work import slip_angles
 
 HARMONICS = 5  # of the mean cycle's headings
 ELEMENTS = smooth.NODES  # of the body; twice as many give the error
@@ -71,6 +74,16 @@ def compare(fit: Kinematics, medium: Any, effects: tuple = ()) -> Comparison:
     The body that moves is the piece from the first point to the last, and its motion is
     told in the unit of the measured one. effects: of the scene, such as drag on the
     head; their lengths are in lengths of that piece."""
+    means = (
+        2 * RESAMPLED + 4
+    )  # cycles solved for, of each of which each cycle is left out
+    count = means * (len(fit.used) + 1) * PHASES
+    with prefer_backend(assumed_seconds(count, ELEMENTS, False, means, "numpy")):
+        return _compared(fit, medium, effects)
+
+
+def _compared(fit: Kinematics, medium: Any, effects: tuple) -> Comparison:
+    """Return what `compare` does."""
     swimmer = Swimmer(medium, Backbone(ELEMENTS), effects)
     near = fit.clock.phase(fit.curve)
 
@@ -131,7 +144,8 @@ def _predicted(
     alpha, alphadot = _bends(cycles, weights, swimmer.joints + 1, tail, head, straight)
     xi = swimmer.velocity(alpha, alphadot)
     net = displacement(xi)
-    slip = swimmer.work(alpha, alphadot, xi).slip.mean(-1)
+    moved = (swimmer.medium, swimmer.body, alpha, alphadot, xi)
+    slip = slip_angles(*moved, effects=swimmer.effects).mean(-1)
     heading = axis + _about_mean(xi, net)
     # The balance is for a body of length 1, the piece with its ends.
     distance = np.hypot(net[:, 0], net[:, 1]) * own * (1 + tail + head)

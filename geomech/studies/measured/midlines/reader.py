@@ -380,6 +380,9 @@ def _clock(header: Sequence[str], place: str) -> tuple[int, str, bool]:
 def _cells(source: Rows, picks: Sequence[int]) -> np.ndarray:
     """Return the numbers of columns (N, picks), nan where a cell is empty; Refusal with
     line and column of anything else."""
+    plain = source.plain_numbers(picks)
+    if plain is not None:
+        return plain
     width = len(source.words)
     values = np.full((len(source.rows), len(picks)), np.nan)
     for k, (line, text) in enumerate(source.rows):
