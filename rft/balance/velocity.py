@@ -22,6 +22,7 @@ from rft.laws.base import Medium
 
 STATUSES = np.array(["sliding", "stuck", "unconverged"])
 UNCONVERGED = 2
+SAMPLES_TOGETHER = 2**20  # that are solved at once, for the memory they take
 LEAST_RATE = 1e-100  # other than 0
 
 
@@ -31,9 +32,10 @@ class Solution(NamedTuple):
     xi: (..., 3), in the body frame, (length/time, length/time, rad/time). residual:
     (...), the larger of force and of moment about the body's mean place, over the axial
     yield force of the whole body (its drag at unit speed in a viscous medium) and over
-    that times the body's length. status: (...), "sliding", "stuck" (both ends of an
-    element are slower than 10 times the regularisation) or "unconverged". iterations:
-    (...), number of evaluations of the load.
+    that times the body's length. code: (...), number of the status in STATUSES:
+    "sliding", "stuck" (both ends of an element are slower than 10 times the
+    regularisation) or "unconverged". iterations: (...), number of evaluations of the
+    load. They take 37 bytes a sample.
 
     A sample is unconverged where its residual exceeds the tolerance plus 1e-14 of the
     largest force, the drag across the whole body over that along it: forces so large
@@ -56,30 +58,35 @@ class Solution(NamedTuple):
 
     xi: np.ndarray
     residual: np.ndarray
-    status: np.ndarray
+    code: np.ndarray
     iterations: np.ndarray
 
+    @property
+    def status(self) -> np.ndarray:
+        """The status (...) of each sample, in words."""
+        return STATUSES[self.code]
+
     def __repr__(self) -> str:
-        if np.ndim(self.status) == 0:
+        if np.ndim(self.code) == 0:
             xi = ", ".join(f"{x:.6g}" for x in self.xi)
             return (
                 f"Solution(xi = ({xi}), {self.status}, residual {self.residual:.1e}, "
                 f"{self.iterations} iterations)"
             )
         kinds = ", ".join(
-            f"{n} {kind}"
-            for kind, n in zip(*np.unique(self.status, return_counts=True))
+            f"{n} {STATUSES[code]}"
+            for code, n in zip(*np.unique(self.code, return_counts=True))
         )
         worst = f"residual up to {np.max(self.residual, initial=0.0):.1e}"
-        return f"Solution({self.status.shape} samples: {kinds or 'none'}; {worst})"
+        return f"Solution({self.code.shape} samples: {kinds or 'none'}; {worst})"
 
     def checked(self) -> Solution:
         """Return this solution; RuntimeError if any sample is unconverged."""
-        unconverged = int(np.count_nonzero(self.status == "unconverged"))
+        unconverged = int(np.count_nonzero(self.code == UNCONVERGED))
         if unconverged:
             worst = float(np.max(self.residual))
             raise RuntimeError(
-                f"{unconverged} of {self.status.size} force balances did not converge "
+                f"{unconverged} of {self.code.size} force balances did not converge "
                 f"(worst residual {worst:.1e}): "
                 "raise 'regularisation', or report the scene"
             )
@@ -156,25 +163,33 @@ def body_velocity(
     if start is not None:
         guess = _guess(start, batch, length)
 
-    alpha = np.ascontiguousarray(alpha.reshape(-1, body.joints).T)
-    alphadot = np.ascontiguousarray(alphadot.reshape(-1, body.joints).T)
-    samples = Samples(assembly, alpha, alphadot, joint_speed(body, alphadot), guess)
-    # A body whose joints are at rest is at rest.
-    moving = samples.speed > 0
-    if not moving.all():
-        samples = samples.take(np.flatnonzero(moving))
-
-    solved = solve(
-        samples.problem,
-        samples.speed,
-        Accuracy(regularisation, tolerance),
-        samples.assembly,
-        backend,
-        threads,
-        samples.guess,
+    alpha = alpha.reshape(-1, body.joints)
+    alphadot = alphadot.reshape(-1, body.joints)
+    size = len(alpha)
+    accuracy = Accuracy(regularisation, tolerance)
+    found = Solution(
+        np.empty((size, 3)),
+        np.empty(size),
+        np.empty(size, np.uint8),
+        np.empty(size, np.int32),
     )
-    solved = _with_samples_at_rest(solved, moving)
-    return _solution(solved, batch, length)
+    for first in range(0, size, SAMPLES_TOGETHER):
+        part = slice(first, first + SAMPLES_TOGETHER)
+        part_assembly = assembly
+        if size > SAMPLES_TOGETHER:
+            part_assembly = assembly.take(part)
+        samples = _samples(part_assembly, body, alpha[part], alphadot[part])
+        if guess is not None:
+            samples = samples._replace(guess=guess[:, part])
+        solved = _solved(samples, accuracy, backend, threads)
+        found.xi[part] = solved.xi.T
+        found.residual[part] = solved.residual
+        within_limit = solved.residual <= solved.limit
+        found.code[part] = np.where(within_limit, solved.stuck, UNCONVERGED)
+        found.iterations[part] = solved.iterations
+    if length != 1.0:
+        found.xi[:, :2] *= length
+    return Solution(found.xi.reshape(*batch, 3), *(x.reshape(batch) for x in found[1:]))
 
 
 class Samples(NamedTuple):
@@ -211,20 +226,32 @@ class Samples(NamedTuple):
         )
 
 
-def _solution(solved: Solutions, batch: tuple[int, ...], length: float) -> Solution:
-    """Return solutions (B,) in body lengths as one of the shape of the batch, in the
-    unit of the body's ``length``."""
-    xi = solved.xi.T
-    if length != 1.0:
-        xi = xi * [length, length, 1.0]
-    within_limit = solved.residual <= solved.limit
-    status = STATUSES[np.where(within_limit, solved.stuck, UNCONVERGED)]
-    return Solution(
-        xi.reshape(*batch, 3),
-        solved.residual.reshape(batch),
-        status.reshape(batch),
-        solved.iterations.reshape(batch),
+def _samples(
+    assembly: Assembly, body: Body, alpha: np.ndarray, alphadot: np.ndarray
+) -> Samples:
+    """Return samples of shapes and rates (B, joints), without guesses."""
+    alpha = np.ascontiguousarray(alpha.T)
+    alphadot = np.ascontiguousarray(alphadot.T)
+    return Samples(assembly, alpha, alphadot, joint_speed(body, alphadot), None)
+
+
+def _solved(
+    samples: Samples, accuracy: Accuracy, backend: str, threads: int | None
+) -> Solutions:
+    """Return the solutions of samples; a body whose joints are at rest is at rest."""
+    moving = samples.speed > 0
+    if not moving.all():
+        samples = samples.take(np.flatnonzero(moving))
+    solved = solve(
+        samples.problem,
+        samples.speed,
+        accuracy,
+        samples.assembly,
+        backend,
+        threads,
+        samples.guess,
     )
+    return _with_samples_at_rest(solved, moving)
 
 
 def _with_samples_at_rest(solved: Solutions, moving: np.ndarray) -> Solutions:
