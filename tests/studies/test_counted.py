@@ -9,7 +9,6 @@ import pytest
 
 from geomech import scenes
 from geomech.mathematics.gaits import Fourier
-from geomech.mathematics.tiers import TIERS
 from geomech.questions.swimmers.accuracy import Accuracy
 from geomech.questions.swimmers.ccf import Ccf
 from geomech.questions.swimmers.run import Run
@@ -191,19 +190,3 @@ def test_memory_is_foretold_too_large_rather_than_too_small():
     finally:
         tracemalloc.stop()
     assert used < foretold < 6 * used
-
-
-@pytest.mark.parametrize(
-    ("scene", "tier", "count"),
-    [
-        # 3 d at each of (degree + 1)^d nodes
-        (FIVE, "path", 3 * 4 * 3**4),
-        (GLASS, "path", 3 * 2 * 3**2),
-        # 3 of each term, cosine and sine of 1, 3 and 5
-        (GLASS, "harmonic", 3 * 6 * 3**2),
-    ],
-)
-def test_a_look_up_reads_the_numbers_of_the_nodes_around(scene, tier, count):
-    numerics = scene.with_numerics(grid=4, interpolation=2, harmonics=5).numerics
-    plan = TIERS[tier].plan(scene.system, numerics, scene.gait, None)
-    assert (plan.read, plan.balances(3, 64)) == (count, 0)
