@@ -168,18 +168,6 @@ def test_the_frame_is_the_scenes():
     assert top.changed(system=in_frame(top.system, "link-3")).frame == "link-3"
 
 
-NESTED = """
-medium = {name = "glass-0.3mm-loose"}
-body = {kind = "chain"}
-effects = [{kind = "end-caps", radius = 0.1}]
-"""
-
-
-def test_a_swimmer_may_be_told_in_full():
-    short = scenes.parse(PLAIN + CAPS + "radius = 0.1\n")
-    assert scenes.parse(SWIMMER + NESTED + GAIT) == short
-
-
 @pytest.mark.parametrize("sign", [1, -1])
 def test_a_gait_that_leaves_the_field_between_few_phases_is_refused(sign):
     """Its largest angle lies at phase pi / 4096, between two of 4096."""

@@ -17,7 +17,7 @@ from geomech.run.cost import BASE
 from geomech.studies.estimates import cost, effort
 from geomech.studies.mechanics import motion
 from geomech.studies.scene_tables import SceneTables
-from rft import Backbone, Chain, body_velocity
+from rft import Backbone
 from rft.balance.listening import listening
 from rft.effects import SkinFriction, Slope, Transient
 
@@ -163,20 +163,6 @@ def test_a_question_takes_the_balances_foretold(name, solved):
     solved.clear()
     question.ask()
     assert foretold == sum(solved)
-
-
-@pytest.mark.parametrize("share", [1.0, 0.5, 0.0, None])
-def test_a_balance_that_is_tried_twice_is_one(share, solved):
-    """From starts of which all, some and none lead to the solution, and from none."""
-    rng = np.random.default_rng(3)
-    alpha, alphadot = rng.uniform(-1, 1, (2, 12, 2))
-    start = body_velocity(VISCOUS.system.medium, Chain(), alpha, alphadot).xi
-    start = np.where(np.arange(12)[:, None] < 12 * (share or 0), start, np.nan)
-    solved.clear()
-    if share is None:
-        start = None
-    body_velocity(GLASS.system.medium, Chain(), alpha, alphadot, start=start)
-    assert sum(solved) == 12
 
 
 def test_memory_is_foretold_too_large_rather_than_too_small():

@@ -1,11 +1,8 @@
 """When a request is too long: assumed seconds, and those that its first balances
 tell."""
 
-import numpy as np
 import pytest
 
-from geomech import scenes
-from geomech.questions.swimmers.sweep import Sweep
 from geomech.run import cost as run_cost
 from geomech.run import runner as runners
 from geomech.run.cost import Cost, decide, is_undecided
@@ -13,19 +10,7 @@ from rft.balance.backend import preferring
 from rft.balance.listening import listener, listening, no_listener
 from rft.core.refusal import Refusal
 
-VISCOUS = scenes.load("three-link-viscous")
 UNDECIDED = Cost(10**6, 31.0, 1e8, 1.0)
-
-
-def test_each_medium_of_a_sweep_is_a_batch():
-    def seconds(n_media, n_amplitudes):
-        media = np.linspace(1, 3, n_media).tolist()
-        amplitudes = np.linspace(0.1, 1, n_amplitudes).tolist()
-        over = {"medium.ratio": media, "gait.amplitude": amplitudes}
-        return Sweep(VISCOUS, over).cost().seconds
-
-    assert seconds(100, 1) == pytest.approx(10 * seconds(10, 1), rel=0.01)
-    assert seconds(10, 10) < 0.4 * seconds(100, 1)
 
 
 class Clock:

@@ -24,7 +24,6 @@ from geomech.studies.measured.midlines import (
     kinematics,
     predicted,
     reader,
-    results,
     slips,
     smooth,
     synthetic,
@@ -609,13 +608,6 @@ def standing(trial):
     return trial_of(trial.t, np.stack([s - 0.4 * bend**2 * s**3, bend * s**2], -1))
 
 
-def backwards(_):
-    """A swimmer that its wave takes along, as where drag is less across the body than
-    along it."""
-    swimmer = Swimmer(Viscous(0.4), Backbone(20))
-    return synthetic.synthetic_midlines(swimmer, 3.4, 30, 20).trial()
-
-
 def sized(size, **facts):
     """A change: points so much larger, with other facts."""
     return lambda t: dataclasses.replace(t, points=size * t.points, **facts)
@@ -624,11 +616,6 @@ def sized(size, **facts):
 def slower(by):
     """A change: a second of it takes so much longer."""
     return lambda t: dataclasses.replace(t, t=t.t + by * np.clip(t.t - 1.5, 0, 1))
-
-
-def every_cycle_gapped(trial):
-    k = np.arange(len(trial.t))
-    return frames_of(trial, (k < 19) | ((k - 19) % 30 >= 5))
 
 
 @pytest.mark.parametrize(
@@ -643,9 +630,7 @@ def every_cycle_gapped(trial):
         (lambda t: frames_of(t, slice(20)), "the trial has 0.[0-9]* cycles: give one full cycle at least"),
         (at(np.indices((133, 30)).sum(0) % 2 * (np.arange(133) > 9)[:, None] > 0, np.nan), "10 frames have most"),
         (standing, "the body bends in one shape to and fro"),
-        (every_cycle_gapped, "line 542 .t = 0.6.: no frames for 0.2 after this one, and so in every cycle"),
         (slower(2.0), "the cycle from t = 1.16 to 3.499 takes 1.7 times as long as most"),
-        (backwards, "the body moves towards its point 1, and so does its wave"),
     ],
 )  # fmt: skip
 def test_trials_that_do_not_tell_are_refused(change, said, noisy):
@@ -748,30 +733,6 @@ def test_of_several_roots_the_one_nearest_to_the_present_value_closes_a_gap():
 
 
 # What is said.
-
-
-@pytest.mark.parametrize(
-    ("timed", "unit", "units"),
-    [
-        (False, "", ["1/frame", "the file's unit", "BL/frame"]),
-        (True, "m", ["Hz", "m", "m/s"]),
-        (True, "BL", ["Hz", "BL", "BL/s"]),
-    ],
-)
-def test_quantities_are_in_the_units_of_the_file(timed, unit, units, fitted):
-    trial = dataclasses.replace(fitted.trial, timed=timed, unit=unit)
-    found = results.units_of(dataclasses.replace(fitted, trial=trial))
-    assert [found[x] for x in ("frequency", "body_length", "speed")] == units
-
-
-def test_the_mean_cycle_and_the_times_of_cycles_are_those_of_the_curve(fitted):
-    result = results.trial_result(fitted)
-    cycles = fitted.cycles(fitted.curve)
-    headings = np.unwrap(np.angle(cycles.tangent), axis=-1)
-    headings -= headings.mean((1, 2), keepdims=True)
-    mean = result["mean_cycle"]
-    np.testing.assert_allclose(mean.values, headings.mean(0), atol=1e-9)
-    np.testing.assert_allclose(result["cycle_start"].values, cycles.t[:, 0], atol=0.02)
 
 
 def test_the_command_compares_a_trial_with_a_medium(noisy, tmp_path, monkeypatch):

@@ -24,7 +24,6 @@ from geomech.studies.optimisation.cycles import Phases, Runs
 from geomech.studies.optimisation.evaluate import evaluate_gait
 from geomech.studies.optimisation.limiting import limiting
 from geomech.studies.optimisation.local.ascent import ascend
-from geomech.studies.optimisation.local.constraints import Constraints
 from geomech.studies.optimisation.local.objectives import Objective
 from geomech.studies.optimisation.local.problem import Problem
 from geomech.studies.optimisation.local.stroke import Stroke
@@ -629,14 +628,6 @@ def test_loops_that_are_one(other, options, same):
     assert not series.is_same(flat, 0.5 * flat) and not series.is_same(0.5 * flat, flat)
 
 
-def test_loops_are_shifted_reversed_and_gaits():
-    loops = Loops(2, 4, 2.5)
-    p = loops.from_gait(TURNED)
-    t = np.linspace(0, 6, 7)
-    back = loops.gait(series.reversed_loop(p)).shape(t)
-    assert back == pytest.approx(TURNED.shape(-t), abs=1e-12)
-
-
 def test_a_stroke_goes_back_nowhere_between_phases():
     # Of e^(i t) + b e^(-3 i t) the sweep is 1 - 3 b^2 - 2 b cos 4 t: here above 0 at
     # all 32 phases and below it between.
@@ -679,29 +670,9 @@ def test_strokes_go_round_once_and_enclose_an_area(twice):
     assert own.slopes(round_) == pytest.approx(rise, abs=1e-8)
 
 
-def test_other_starts_are_made_one_stroke_if_the_first_is_one(twice):
-    loops = Loops(2, 3, 2.5)
-    first = loops.from_gait(Circle())
-    for own, one in ((first, True), (twice, False)):
-        constraints = Constraints(loops, None, own)
-        assert Stroke.is_one(loops, constraints.feasible(twice)) is one
-        assert np.array_equal(constraints.feasible(first), first)
-
-
 # Undulations.
 
 SINES = Undulations(Sine(elements=30, amplitude=0.3, frequency=2.0), phases=16)
-
-
-def test_limits_of_undulations_are_their_bounds():
-    # At a bound a limit is touched, beyond it is not kept.
-    low, high = SINES.bounds
-    A, b = SINES.limits()
-    assert low.tolist() == [0.01, 0.5] and high.tolist() == [1.0, 2.5]
-    for corner, way in ((low, -1e-3), (high, 1e-3)):
-        assert sorted(b - A @ corner) == pytest.approx([0, 0, *sorted(high - low)])
-        for e in way * np.eye(2):
-            assert (A @ (corner + e) > b).sum() == 1
 
 
 def test_undulations_are_sines():

@@ -76,20 +76,6 @@ BATCHES = {
 }
 
 
-@pytest.fixture
-def batches(monkeypatch):
-    """A list of all calls of the engine."""
-    calls = []
-    direct = estimate.direct
-
-    def counted(*arguments):
-        calls.append(arguments)
-        return direct(*arguments)
-
-    monkeypatch.setattr(estimate, "direct", counted)
-    return calls
-
-
 @pytest.mark.parametrize("key", BATCHES)
 def test_points_that_differ_in_gait_and_effects_go_side_by_side(key):
     effects, values = BATCHES[key]
