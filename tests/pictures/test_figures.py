@@ -5,7 +5,6 @@ import importlib
 import inspect
 import math
 import pkgutil
-import subprocess
 import sys
 
 import numpy as np
@@ -44,18 +43,6 @@ def test_every_script_computes_and_draws(name):
     module = importlib.import_module(name)
     assert module.__doc__ and module.compute.__doc__
     assert list(inspect.signature(module.draw).parameters) == ["numbers"]
-
-
-def test_figures_load_nothing_when_imported():
-    """A figure reads and computes when it is asked to."""
-    code = (
-        "import importlib, rft, geomech.scenes as s\n"
-        "def refuse(*args, **kwargs): raise AssertionError('loaded on import')\n"
-        "s.load = s.parse = rft.body_velocity = refuse\n"
-        f"for name in {sorted(SCRIPTS)}: importlib.import_module(name)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
 
 
 def test_a_script_writes_the_file_it_is_asked_for(tmp_path, monkeypatch):
@@ -102,11 +89,11 @@ def test_a_curve_shows_its_numbers(module, coarse, axes, label, expected, tmp_pa
 # Scripts whose numbers other tests hold, and what is enough for a picture.
 COARSE = {
     "accuracy.kinks": {"grid": 21, "directions": 24},
-    "swimmers.optimal_gaits": {"harmonics": 2, "starts": 1, "grid": 11, "phases": 32},
-    "robots.sand_gaits": {"generations": 2, "walks": 4, "seconds": 0.6},
+    "swimmers.optimal_gaits": {"harmonics": 1, "starts": 1, "grid": 7, "phases": 16},
+    "robots.sand_gaits": {"generations": 1, "walks": 4, "seconds": 0.3},
     "robots.walking_mujoco": {
-        "study": {"steps": (8, 12)},
-        "finest": {"steps": 24},
+        "study": {"steps": (8, 10)},
+        "finest": {"steps": 12},
         "frequencies": {},
     },
 }

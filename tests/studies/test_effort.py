@@ -109,7 +109,7 @@ def test_errors_of_work_in_time_stepping_cover_steps_and_pieces(effect):
     """The mean over every other step of the same march knows of neither."""
     one = scene(Swimmer(Viscous(2.5), Chain((1, 1.4, 0.7)), (effect,)))
     found = effort.effort(one.with_numerics(pieces=20), GAIT, [0.7], 32)
-    fine = effort.effort(one.with_numerics(pieces=80), GAIT, [0.7], 64)
+    fine = effort.effort(one.with_numerics(pieces=40), GAIT, [0.7], 48)
     off = np.abs(found["work"] - fine["work"])
     assert off <= found["work_error"] < 0.05 * fine["work"]
 

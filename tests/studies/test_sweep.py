@@ -79,7 +79,7 @@ BATCHES = {
 @pytest.mark.parametrize("key", BATCHES)
 def test_points_that_differ_in_gait_and_effects_go_side_by_side(key):
     effects, values = BATCHES[key]
-    fish = with_effects(*effects).with_numerics(phases=32, pieces=12)
+    fish = with_effects(*effects).with_numerics(phases=12, pieces=4)
     if "body-inertia" not in key:  # which settles
         fish = fish.with_numerics(cycles=1)
     over = {key: values, "gait.amplitude": [0.1, 0.2]}
@@ -95,7 +95,7 @@ def test_a_level_ground_is_no_gentle_slope():
     """Without a slope cycles become periodic, with one there is one cycle: they do not
     share a batch."""
     travel = '"transient"\ntravel = 0.03'
-    coarse = {"phases": 16, "pieces": 6}
+    coarse = {"phases": 8, "pieces": 3}
     fish = with_effects(travel, '"depth-profile"\nslope = 0.0').with_numerics(**coarse)
     found = swept(fish, {"effects.depth-profile.slope": [0.0, 0.05]})["displacement"]
     level = net(with_effects(travel).with_numerics(**coarse))
