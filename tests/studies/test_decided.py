@@ -1,5 +1,4 @@
-"""When a request is too long: assumed seconds, and those that its first balances
-tell."""
+"""When a request is too long: by seconds that its first balances tell."""
 
 import pytest
 

@@ -34,6 +34,7 @@ from geomech.scenes import load
 from geomech.studies import measured
 from geomech.studies.maps import fields
 from geomech.studies.measured import (
+    plausibility,
     regression,
     results,
     smooth,
@@ -847,9 +848,37 @@ def test_the_command_tells_what_the_fit_does(usual, tmp_path):
     assert geomech.fitted_gait(geomech.load_result(tmp_path / "field.nc")) == scene.gait
 
 
-def test_the_picture_shows_all_there_is():
+def test_the_figure_is_drawn():
     numbers = measured_gait.compute(cycles=12)
     assert measured_gait.draw(numbers).axes
 
 
-# Both sides of what logs are refused and warned for.
+# Notes of units.
+
+
+def smooth_of(values, noise=0.0, knots=4.0):
+    values = np.asarray(values, float)
+    return smooth.Smoothed(values, values, (), knots, np.full(values.shape[1], noise))
+
+
+@pytest.mark.parametrize(
+    ("speed", "turn", "period", "length", "facts", "said"),
+    [
+        (0.98, 1.96, 299.0, 1.0, {}, ()), (1.02, 0.0, 1.0, 1.0, {}, ("x and y move by 2.04 body lengths where",)),
+        (0.5, 2.02, 1.0, 1.0, {}, ("the heading turns 4.04 times as fast as the joints",)),
+        (2.9, 0.0, 1.0, 3.0, {"metres": True}, ()), (0.5, 0.0, 301.0, 1.0, {"seconds": False}, ()),
+        (3.1, 0.0, 301.0, 3.0, {}, ("x and y move by 2.07", "the joints repeat every 301, and t is")),
+        (0.5, 0.0, 1.0, None, {"metres": True}, ("x and y are in m by the names",)),
+        (0.5, 0.0, 1.0, 1.0, {"metres": True}, ()),
+    ],
+)  # fmt: skip
+def test_units_are_noted_beyond_what_bodies_do(
+    speed, turn, period, length, facts, said, recwarn
+):
+    # Joints turn by 0.5 rad per unit of time, in all.
+    joints = np.tile([0.3, -0.4], (9, 1))
+    moves = np.tile([0.6 * speed, -0.8 * speed, turn], (9, 1))
+    log = measured.Log("log.csv", joints, joints, moves, ("a1", "a2"), joints, **facts)
+    plausibility.note_units(log, smooth_of(joints), smooth_of(moves), period, length)
+    for told, expected in zip(recwarn.list, said, strict=True):
+        assert str(told.message).startswith(f"log.csv: {expected}")

@@ -433,24 +433,16 @@ def test_a_table_that_never_turns_is_refused(tmp_path):
 # Systems of all kinds.
 
 
-def serpenoid(body=None):
-    body = Serpenoid(elements=8, waves=1.0) if body is None else body
-    return Scene(
-        Swimmer(SAND, body),
-        Circle(amplitude=5.0),
-        Numerics(phases=64, extent=7.0, grid=9),
-    )
-
-
 @pytest.mark.parametrize(
     "body",
     [Serpenoid(elements=8, waves=1.0), ConstantCurvature(elements=8)],
     ids=["modes", "arcs"],
 )
 def test_bodies_of_few_shape_variables(body):
-    found = optimise(serpenoid(body), "efficiency", harmonics=2, starts=1)
+    numerics = Numerics(phases=64, extent=7.0, grid=9)
+    scene = Scene(Swimmer(SAND, body), Circle(amplitude=5.0), numerics)
+    found = optimise(scene, "efficiency", harmonics=2, starts=1)
     assert found.value > 1.02 * found.start.value
-    assert found.best.length == found.best.work
     assert np.abs(found.gait.cycle(500)[0]).max() <= 7.0
 
 
