@@ -12,7 +12,7 @@ from tabled import of_swept, of_table
 
 import geomech
 from geomech import plots, scenes
-from geomech.mathematics.gaits import Ellipse
+from geomech.mathematics.gaits import Ellipse, Wave
 from geomech.mathematics.geometry.connection import Connection
 from geomech.mathematics.geometry.representations.field import Field
 from geomech.mathematics.tiers import TIERS
@@ -319,6 +319,14 @@ def test_options_of_pictures_reach_them(question, options, titled):
     assert titles(figure) == titled
     if "clim" in options:
         assert only(figure.axes[0], QuadMesh).get_clim() == (-0.5, 0.5)
+
+
+def test_a_slice_has_its_own_joints_on_its_axes():
+    scene = scenes.load("three-link-viscous").with_numerics(grid=5, phases=16)
+    four = scene.changed(body=geomech.bodies.Chain((1, 1, 1, 1)), gait=Wave(joints=3))
+    ax = geomech.study(four).ccf(pair="1,3").plot().axes[0]
+    labels = (ax.get_xlabel(), ax.get_ylabel())
+    assert labels == (r"$\alpha_{1}$ (rad)", r"$\alpha_{3}$ (rad)")
 
 
 def test_measurements_of_a_file_are_drawn_where_they_belong(tmp_path):
