@@ -12,20 +12,12 @@ from tabled import of_swept, of_table
 
 import geomech
 from geomech import plots, scenes
-from geomech.core.setting import Setting
-from geomech.core.variables import Result, Variable
-from geomech.mathematics.gaits import Ellipse
+from geomech.mathematics.gaits import Ellipse, Wave
 from geomech.mathematics.geometry.connection import Connection
 from geomech.mathematics.geometry.representations.field import Field
 from geomech.mathematics.tiers import TIERS
-from geomech.plots.displacement import sweeps
-from geomech.plots.displacement.displacements import ERROR, MEASURED, MEDIUM
-from geomech.plots.displacement.precision import PANELS
-from geomech.questions.shared.texts import colour_limit
 from geomech.scenes.data.measurements import read
 from geomech.studies.scene_tables import SceneTables
-from geomech.studies.settings import Measurements, measurement_variables, padded_array
-from rft.core.refusal import Refusal
 
 AXES = np.linspace(-1.0, 1.5, 11), np.linspace(-0.5, 2.0, 9)
 X, Y = np.meshgrid(*AXES, indexing="ij")
@@ -57,33 +49,6 @@ def test_arrows_are_a_row_of_the_connection(row):
     np.testing.assert_allclose(drawn, A[row, :, 1::2, 1::2].reshape(2, -1))
     label = arrows.colorbar.ax.get_ylabel()
     assert ("(rad/rad)" if row == 2 else "(m/rad)") in label
-    figure = plots.connection_figure(FITTED)
-    assert titles(figure)[row] == NAMES[row]
-    np.testing.assert_allclose(only(figure.axes[row], Quiver).V, A[row, 1].ravel())
-
-
-def test_each_row_of_a_connection_has_its_scale_whose_top_may_be_a_percentile():
-    sizes = np.hypot(A[:, 0], A[:, 1])
-    for clim, tops in (
-        (None, sizes.max((1, 2))),
-        ("80%", np.percentile(sizes, 80, axis=(1, 2))),
-        ("5%:80%", np.percentile(sizes, 80, axis=(1, 2))),
-        (0.7, [0.7] * 3),
-    ):
-        axes = plots.connection_figure(FITTED, clim=clim).axes[:3]
-        drawn = [only(ax, Quiver) for ax in axes]
-        np.testing.assert_allclose([x.get_clim()[1] for x in drawn], tops)
-        assert drawn[0].colorbar.extend == ("max" if clim else "neither")
-        longest = [np.hypot(x.U, x.V).max() for x in drawn]
-        np.testing.assert_allclose(longest, tops)
-
-
-def test_a_row_of_rounding_has_no_arrows():
-    """A snake that cannot slip sideways, in the frame of a wheeled link."""
-    snake = scenes.load("no-slip-snake").changed(frame="link-2").with_numerics(grid=8)
-    arrows = only(plots.vector_field(SceneTables(snake).fitted, 1), Quiver)
-    assert not np.ma.masked_array(np.hypot(arrows.U, arrows.V), arrows.Umask).any()
-    assert arrows.get_clim() == (0.0, 1.0)
 
 
 # Fields
@@ -101,21 +66,16 @@ def test_the_map_of_a_field_lies_as_the_field(row):
     ax = plots.ccf_map(FIELD, row, [gait], error=UNSURE)
     x, y, values = mesh(ax)
     np.testing.assert_allclose(values, (1, 3, -1)[row] * (x + 2 * y))
-    top = np.abs(values).max()
-    assert only(ax, QuadMesh).get_clim() == pytest.approx((-top, top))
     hatched, zeros = (c for c in ax.collections if not isinstance(c, QuadMesh))
     line = np.concatenate([p.vertices for p in zeros.get_paths()])
-    assert len(line) > 4
     np.testing.assert_allclose(line @ [1, 2], 0, atol=1e-12)
     points = [[0.9, 1.6], [-0.7, 1.5], [0.9, 0.9], [-0.7, 0.9]]
     inside = [p.contains_points(points) for p in hatched.get_paths()]
     assert np.any(inside, axis=0).tolist() == [True, True, False, False]
-    assert texts(ax.get_legend().get_texts()) == [plots.HATCHED]
     loop = gait.shape(np.linspace(0, 2 * np.pi, 400))
     np.testing.assert_allclose(ax.lines[0].get_xydata(), loop)
     label = only(ax, QuadMesh).colorbar.ax.get_ylabel()
     assert ("(rad/rad$^2$)" if row == 2 else "(m/rad$^2$)") in label
-    assert NAMES[row] in plots.ccf_figure(FIELD).axes[row].get_title()
 
 
 def test_the_line_of_zeros_leaves_noise_alone():
@@ -130,7 +90,6 @@ def test_the_line_of_zeros_leaves_noise_alone():
     error[small] = error[large] = 1.0
     kept = plots.certain(values, error)
     assert kept[small] > 0 and (kept[large] < 0).all() and kept[sure] < 0
-    np.testing.assert_array_equal(np.sign(kept[9:11]), [[1.0] * 20, [-1.0] * 20])
     known = error == 0.1
     np.testing.assert_array_equal(kept[known], values[known])
 
@@ -152,7 +111,6 @@ def test_hatching_leaves_out_what_goes_along_with_a_line_of_zeros(place, is_hatc
     error[place] = 2.0
     expected = (error > 0) & is_hatched
     np.testing.assert_array_equal(plots.unknown(values, error), expected)
-    np.testing.assert_array_equal(plots.unknown(values.T, error.T), expected.T)
 
 
 def test_a_gait_is_drawn_as_far_as_the_field_goes():
@@ -163,53 +121,34 @@ def test_a_gait_is_drawn_as_far_as_the_field_goes():
     loop[(loop[:, 0] < -1) | (loop[:, 0] > 1.5)] = np.nan
     np.testing.assert_allclose(drawn, loop)
     assert "gait leaves the field" in texts(ax.texts)
-    within = plots.ccf_map(FIELD, 0, [Ellipse(centre=(0.2, 0.5), semi_axes=(1, 0.4))])
-    assert "gait leaves the field" not in texts(within.texts)
 
 
 @pytest.mark.parametrize(
     ("name", "rows"), [("three-link-floating", [2]), ("differential-drive", [1])]
 )
 def test_what_is_nothing_but_rounding_is_drawn_as_nothing(name, rows):
-    """Left out with a word unless it is asked for."""
+    """Left out with a word."""
     study = SceneTables(scenes.load(name).with_numerics(grid=9, phases=16))
-    given = {"error": study.curvature_error, "components": ("x", "y", "theta")}
-    figure = plots.ccf_figure(study.curvature, **given)
-    for k, ax in enumerate(figure.axes[:3]):
-        colours = np.asarray(only(ax, QuadMesh).get_array())
-        assert (np.abs(colours).max() > 1e-3) == (k in rows)
     figure = plots.ccf_figure(study.curvature, error=study.curvature_error)
     assert titles(figure) == [NAMES[k] for k in rows]
     assert figure.get_supxlabel().count("CCF") == 3 - len(rows)
 
 
 @pytest.mark.parametrize(
-    ("clim", "top", "extend"),
+    ("clim", "top"),
     [
-        (None, np.abs(PLANE).max(), "neither"),
-        (0.25, 0.25, "both"),
-        (5.0, 5.0, "max"),
-        ("90%", np.percentile(np.abs(PLANE), 90), "max"),
-        ("20%:90%", np.percentile(PLANE, 90), "max"),
+        (None, np.abs(PLANE).max()),
+        (0.25, 0.25),
+        (5.0, 5.0),
+        ("90%", np.percentile(np.abs(PLANE), 90)),
+        ("20%:90%", np.percentile(PLANE, 90)),
     ],
 )
-def test_colours_have_a_limit_and_stay_centred_on_zero(clim, top, extend):
-    """Arrows of the bar say where there is more."""
+def test_colours_have_a_limit_and_stay_centred_on_zero(clim, top):
     figure = plots.ccf_figure(FIELD, components=("x", "theta"), clim=clim)
     one, other = (only(ax, QuadMesh) for ax in figure.axes[:2])
     assert one.get_clim() == pytest.approx((-top, top))
-    assert one.colorbar.extend == extend
     assert "%:" in str(clim) or other.get_clim() == pytest.approx((-top, top))
-
-
-def test_a_limit_is_a_number_of_one_unit_or_percentiles():
-    assert colour_limit("5%:95%") == "5%:95%"
-    assert colour_limit("0.3", ("theta",)) == colour_limit("0.3", ("x", "y")) == 0.3
-    with pytest.raises(ValueError, match="one limit"):
-        colour_limit("0.3", ("theta", "x"))
-    for text in ("5:9", "95%:5%", "5%:9", "5%:5%", "0%", "1%:2%:3%"):
-        with pytest.raises(Refusal, match="is no limit"):
-            colour_limit(text)
 
 
 # Displacements
@@ -233,7 +172,7 @@ def test_lines_of_displacement_are_a_quantity_of_each_tier(quantity):
     table |= {k: {"direct": [x, x], "area": [x, x]} for k, x in errors.items()}
     table["medium_error_of"] = {quantity: [0.2, 0.4]}
     ax = plots.displacement(of_table(table, "m", "A (rad)"), quantity=quantity)
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("A (rad)", label)
+    assert ax.get_ylabel() == label
     for tier, values in (("direct", direct), ("area", area)):
         drawn = curve(ax, TIERS[tier].label)
         np.testing.assert_allclose(drawn, [[0.5, 1.0], values])
@@ -243,8 +182,6 @@ def test_lines_of_displacement_are_a_quantity_of_each_tier(quantity):
     ):
         limits = [np.subtract(values, margin), np.add(values, margin)]
         np.testing.assert_allclose(found, limits)
-    legend = [TIERS["area"].label, TIERS["direct"].label, ERROR, MEDIUM]
-    assert texts(ax.get_legend().get_texts()) == legend
 
 
 def edges(collection):
@@ -275,9 +212,6 @@ def test_measurements_are_points_with_bars_in_the_units_they_name(data, x, y):
         (bars,) = points[2]
         ends = [bar[:, 1] for bar in bars.get_segments()]
         np.testing.assert_allclose(ends, [[0.08, 0.12], [0.17, 0.23]])
-    assert MEASURED in texts(ax.get_legend().get_texts())
-    with pytest.raises(Refusal, match="data"):
-        plots.displacement(result, data={"amplitude": [1.0], "value_kg": [1.0]})
 
 
 @pytest.mark.parametrize(
@@ -321,8 +255,6 @@ def test_panels_that_are_zero_are_left_out_with_a_reason(
     figure = plots.displacement_figure({"a": result}, components=components)
     assert [ax.get_ylabel().partition(" per")[0] for ax in figure.axes] == panels
     assert told in figure.get_supxlabel()
-    with pytest.raises(Refusal, match="component: 'z' is unknown"):
-        plots.displacement_figure({"a": result}, components=("z",))
 
 
 # Sweeps and accuracy
@@ -346,9 +278,6 @@ def test_the_map_of_a_sweep_lies_as_its_parameters(order):
     np.testing.assert_allclose(x[0], amplitudes)
     np.testing.assert_allclose(y[:, 0], [2.0, 5.0])
     np.testing.assert_allclose(values, ORDERED.T)
-    assert figure.axes[1].get_ylabel() == "net distance per cycle (m), backwards < 0"
-    labels = ax.get_xlabel(), ax.get_ylabel()
-    assert labels == (GLASS.gait.amplitude_label, "length (m)")
 
 
 @pytest.mark.parametrize(
@@ -374,42 +303,6 @@ def test_a_sweep_over_one_parameter_is_a_line_with_bars(more, y, label):
         np.testing.assert_allclose(bars[1], [[5, -3], [5, -1]])
 
 
-def test_parameters_have_names_and_units():
-    scene = scenes.load("sandfish-heavy")
-    named = {
-        "medium.C": "C (-)",
-        "effects.frequency": "frequency (Hz)",
-        "medium.gamma0_deg": r"$\gamma_{0}$ (deg)",
-        "effects.end-caps.radius": "end-caps: radius (BL)",
-        "effects.disturbed-ground.radius": "disturbed-ground: radius (BL)",
-        "gait.amplitude": scene.gait.amplitude_label,
-    }
-    assert sweeps.axis_labels(scene, [*named]) == [*named.values()]
-
-
-def studied(*rows):
-    """An accuracy study of rows (setting, errors, seconds)."""
-    settings, errors, seconds = zip(*rows)
-    values = padded_array([setting.values for setting in settings])
-    errors = {"error": padded_array(errors)}
-    measured = Measurements(settings, values, padded_array(seconds), errors)
-    amplitude = Variable("amplitude", ("amplitude",), np.ones(1))
-    found = measurement_variables(measured, "BL", {"error": "rms"})
-    return Result("accuracy", (*found, amplitude), {"about": "the displacement"})
-
-
-@pytest.mark.parametrize("against", PANELS)
-@pytest.mark.parametrize("error", [[1e-3, 1e-5, 0.0], [0.0, 0.0, 0.0]])
-def test_a_work_precision_diagram_takes_errors_of_0(error, against):
-    """As of systems that no setting approximates: warnings are errors here."""
-    phases = Setting("phases", (16, 64, 128), 2, "", against, "direct")
-    figure = plots.accuracy_figure(studied((phases, error, (0.1, 0.3, 0.5))))
-    figure.canvas.draw()
-    (ax,) = figure.axes
-    assert (ax.get_title(), ax.get_ylabel()) == PANELS[against]
-    np.testing.assert_array_equal(ax.lines[0].get_ydata(), np.maximum(error, 1e-17))
-
-
 # Options
 
 
@@ -426,6 +319,14 @@ def test_options_of_pictures_reach_them(question, options, titled):
     assert titles(figure) == titled
     if "clim" in options:
         assert only(figure.axes[0], QuadMesh).get_clim() == (-0.5, 0.5)
+
+
+def test_a_slice_has_its_own_joints_on_its_axes():
+    scene = scenes.load("three-link-viscous").with_numerics(grid=5, phases=16)
+    four = scene.changed(body=geomech.bodies.Chain((1, 1, 1, 1)), gait=Wave(joints=3))
+    ax = geomech.study(four).ccf(pair="1,3").plot().axes[0]
+    labels = (ax.get_xlabel(), ax.get_ylabel())
+    assert labels == (r"$\alpha_{1}$ (rad)", r"$\alpha_{3}$ (rad)")
 
 
 def test_measurements_of_a_file_are_drawn_where_they_belong(tmp_path):

@@ -55,15 +55,6 @@ def test_errors_are_root_mean_squares_over_amplitudes():
     assert error == pytest.approx(np.sqrt((0.05**2 + 0.1**2) / 3))
 
 
-@pytest.mark.parametrize(
-    ("name", "factor"),
-    [("phases", 2), ("segments", 2), ("nodes", 2), ("regularisation", 0.1)],
-)
-def test_values_of_a_setting_are_a_geometric_series(name, factor, glass):
-    values = line(glass, f"direct: {name}")["value"]
-    assert values[1:] / values[:-1] == pytest.approx(factor)
-
-
 def test_every_setting_gets_better(glass):
     """But for those whose tier has an error of its own."""
     labels = glass["setting"].values.tolist()
@@ -73,25 +64,6 @@ def test_every_setting_gets_better(glass):
         assert (found["seconds"] > 0).all()
         if label not in ("path: grid", "area: grid"):
             assert found["error"][-1] < 0.5 * found["error"][0], label
-
-
-def test_a_linear_medium_has_no_dry_settings(viscous):
-    labels = " ".join(viscous["setting"].values.tolist())
-    assert "direct: phases" in labels
-    for name in ("regularisation", "harmonic", "path"):
-        assert name not in labels
-
-
-def test_amplitudes_go_up_to_the_gaits_own(glass):
-    shares = np.array([0.4, 0.55, 0.7, 0.85, 1.0])
-    expected = shares * SAND.gait.amplitude
-    np.testing.assert_allclose(glass["amplitude"].values, expected)
-
-
-def test_the_truth_has_exact_integrals_whatever_rule_the_scene_takes():
-    ruled = SAND.with_numerics(loads="midpoint:3", regularisation=1e-3)
-    solver = tiered.Settings(ruled).scene_with(None, None).system.solver
-    assert (solver.loads, solver.regularisation) == ("exact", 1e-9)
 
 
 def test_tiers_rank_as_they_should(glass):

@@ -9,7 +9,6 @@ import pytest
 
 from geomech import scenes
 from geomech.mathematics.gaits import Fourier
-from geomech.mathematics.tiers import TIERS
 from geomech.questions.swimmers.accuracy import Accuracy
 from geomech.questions.swimmers.ccf import Ccf
 from geomech.questions.swimmers.run import Run
@@ -18,7 +17,7 @@ from geomech.run.cost import BASE
 from geomech.studies.estimates import cost, effort
 from geomech.studies.mechanics import motion
 from geomech.studies.scene_tables import SceneTables
-from rft import Backbone, Chain, body_velocity
+from rft import Backbone
 from rft.balance.listening import listening
 from rft.effects import SkinFriction, Slope, Transient
 
@@ -166,20 +165,6 @@ def test_a_question_takes_the_balances_foretold(name, solved):
     assert foretold == sum(solved)
 
 
-@pytest.mark.parametrize("share", [1.0, 0.5, 0.0, None])
-def test_a_balance_that_is_tried_twice_is_one(share, solved):
-    """From starts of which all, some and none lead to the solution, and from none."""
-    rng = np.random.default_rng(3)
-    alpha, alphadot = rng.uniform(-1, 1, (2, 12, 2))
-    start = body_velocity(VISCOUS.system.medium, Chain(), alpha, alphadot).xi
-    start = np.where(np.arange(12)[:, None] < 12 * (share or 0), start, np.nan)
-    solved.clear()
-    if share is None:
-        start = None
-    body_velocity(GLASS.system.medium, Chain(), alpha, alphadot, start=start)
-    assert sum(solved) == 12
-
-
 def test_memory_is_foretold_too_large_rather_than_too_small():
     """Of gaits that fill a batch, beside what is in memory anyway."""
     scene = GLASS.with_numerics(phases=4096)
@@ -191,19 +176,3 @@ def test_memory_is_foretold_too_large_rather_than_too_small():
     finally:
         tracemalloc.stop()
     assert used < foretold < 6 * used
-
-
-@pytest.mark.parametrize(
-    ("scene", "tier", "count"),
-    [
-        # 3 d at each of (degree + 1)^d nodes
-        (FIVE, "path", 3 * 4 * 3**4),
-        (GLASS, "path", 3 * 2 * 3**2),
-        # 3 of each term, cosine and sine of 1, 3 and 5
-        (GLASS, "harmonic", 3 * 6 * 3**2),
-    ],
-)
-def test_a_look_up_reads_the_numbers_of_the_nodes_around(scene, tier, count):
-    numerics = scene.with_numerics(grid=4, interpolation=2, harmonics=5).numerics
-    plan = TIERS[tier].plan(scene.system, numerics, scene.gait, None)
-    assert (plan.read, plan.balances(3, 64)) == (count, 0)

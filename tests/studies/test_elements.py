@@ -143,9 +143,3 @@ def test_path_length_work_and_efficiency_contain_it():
         for one in (coarse, fine)
     ]
     assert abs(values[0].value - values[1].value) < values[0].error
-
-
-@pytest.mark.parametrize("body", [rft.Chain(), arcs(12, continuous=False)])
-def test_rigid_links_have_no_error_of_elements(body):
-    _, error = direct(Scene(Swimmer(FLUID, body), Circle(1.0)))
-    assert error[0] < 1e-9

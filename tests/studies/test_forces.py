@@ -13,7 +13,7 @@ from geomech.mathematics.geometry.reconstruct import poses
 from geomech.mathematics.systems import Swimmer
 from geomech.scenes import Scene
 from geomech.scenes.frames import framed
-from geomech.studies.mechanics.forces import answer, cost, forces
+from geomech.studies.mechanics.forces import answer, forces
 from geomech.studies.mechanics.newtons import Sizes
 from rft import (
     Backbone,
@@ -87,18 +87,11 @@ def test_thrust_and_drag_balance_and_forces_do_the_work_of_the_joints(name, tmp_
     thrust = sum(v[f"thrust_{part}"] for part in PARTS)
     assert np.abs(net(v)).max() < 1e-8 < thrust.min()
     assert v["medium_power"] == pytest.approx(v["joint_power"], rel=1e-6)
-    assert v["medium_power"].min() > 0
     ends = v["tail_forward"] + v["head_forward"]
     along = (v["forward"] * v["length"]).sum(-1)
     assert along + ends == pytest.approx(0.0, abs=1e-8)
-    assert v["length"].sum() == pytest.approx(1.0)
     both = v["forward_normal"] + v["forward_tangential"]
     assert v["forward"] == pytest.approx(both)
-    means = [
-        v[f"mean_{kind}_{part}"] for kind in ("thrust", "drag") for part in PARTS[:2]
-    ]
-    assert sum(means) == pytest.approx(v["forward"].mean(0), abs=1e-12)
-    assert not (v["tangential"] > 0).all()
 
 
 def places(scene, s):
@@ -118,7 +111,7 @@ def test_forces_laid_out_in_the_plane_hold_the_moments(name, tmp_path):
     """Net force and moment vanish, and the moment at a point is that of the forces
     behind it."""
     scene = SCENES[name](tmp_path).with_numerics(phases=24)
-    v, run = values(scene)
+    v, _ = values(scene)
     place, heading, head = places(scene, v["s"])
     force = (v["tangential"] + 1j * v["normal"]) * heading * v["length"]
 
@@ -134,9 +127,6 @@ def test_forces_laid_out_in_the_plane_hold_the_moments(name, tmp_path):
     assert moment == pytest.approx(v["bending_moment"][:, k], abs=1e-3)
     ends = v["bending_moment"][:, [0, -1]]
     assert np.abs(ends).max() < 0.05 * np.abs(moment).max()
-    angle = run.direction + run.net[2] * (np.arange(24) / 24 - 0.5)
-    forward = (force * np.exp(-1j * angle)[:, None]).real
-    assert forward == pytest.approx(v["forward"] * v["length"], abs=1e-8)
 
 
 def test_a_small_sine_in_a_fluid_has_the_forces_of_its_closed_form():
@@ -148,7 +138,7 @@ def test_a_small_sine_in_a_fluid_has_the_forces_of_its_closed_form():
     slope = 0.02
     gait = Sine(amplitude=slope / (2 * np.pi), waves=waves, elements=320)
     scene = Scene(Swimmer(Viscous(r), Backbone(320)), gait).with_numerics(phases=16)
-    v, run = values(scene)
+    v, _ = values(scene)
     k = 2 * np.pi * waves
     A = slope / k
     size = r * k * A**2
@@ -161,17 +151,6 @@ def test_a_small_sine_in_a_fluid_has_the_forces_of_its_closed_form():
     assert v["power"][:, middle] == pytest.approx(power * cos2, abs=0.02 * power)
     tangential = v["forward_tangential"][:, middle].mean()
     assert tangential == pytest.approx(-size / 2, rel=0.02)
-    assert v["thrust_normal"] == pytest.approx(size / 2, rel=0.03)
-    travel = (r - 1) * k * A**2 / 2 * 2 * np.pi
-    assert np.hypot(*run.net[:2]) == pytest.approx(travel, rel=0.03)
-
-
-@dataclasses.dataclass(frozen=True)
-class Doubled:
-    """A fluid whose drag is told in another unit."""
-
-    def traction(self, v_t, v_n, rounding=0.0):
-        return 2.0 * v_t, 6.0 * v_n
 
 
 PLAIN = geomech.load("three-link-viscous").changed(medium=FLUID)
@@ -181,13 +160,12 @@ PLAIN = PLAIN.with_numerics(phases=16, grid=9)
 @pytest.mark.parametrize(
     "other",
     [
-        PLAIN.changed(medium=Doubled()),
         PLAIN.changed(body=Chain(frame="link-3")),
         PLAIN.changed(system=framed(PLAIN.system, PLAIN.numerics)),
     ],
-    ids=["unit", "link", "frame"],
+    ids=["link", "frame"],
 )
-def test_forces_do_not_see_the_frame_or_the_unit_of_a_law(other):
+def test_forces_do_not_see_the_frame(other):
     one, _ = values(PLAIN)
     two, _ = values(other)
     for name in ("normal", "forward", "bending_moment", "medium_power"):
@@ -198,7 +176,6 @@ def test_a_heavy_body_is_pushed_by_what_accelerates_it():
     """Thrust and drag balance in the mean alone; so do the powers."""
     gait = dataclasses.replace(HEAVY.gait, elements=20)
     v, _ = values(HEAVY.changed(body=Backbone(20), gait=gait).with_numerics(phases=32))
-    assert np.abs(net(v)).max() > 0.01
     assert abs(net(v).mean()) < 2e-4 * np.abs(v["drag_tangential"]).max()
     assert v["joint_power"].mean() == pytest.approx(v["medium_power"].mean(), rel=1e-3)
     assert np.abs(v["joint_power"] - v["medium_power"]).max() > 1e-3
@@ -214,27 +191,11 @@ def test_on_a_slope_forces_hold_the_weight_in_the_world():
     assert net(v) == pytest.approx(weight, abs=2e-3)
 
 
-@pytest.mark.parametrize(
-    ("name", "balances"),
-    [
-        # Of 32 phases, whose images the others are, a quarter and the middle.
-        ("three-link-viscous", 9),
-        ("three-link-glass", 2 * 9),  # and a law computed more exactly
-        ("sandfish-loose", 16 + 32),  # and half the elements
-        # 3 cycles, assumed until it repeats; half the elements, pieces and steps.
-        ("sandfish-heavy", 3 * (3 * 32 + 16)),
-    ],
-)
-def test_the_cost_counts_all_that_errors_take(name, balances):
-    assert cost(geomech.load(name).with_numerics(phases=32)).balances == balances
-
-
 def test_newtons_and_watts_follow_from_sizes():
     """Stress x 2 r L; the catalogue's stress grows with depth; a heavy body says its
     own."""
     fish = FISH.with_numerics(phases=16)
-    plain, of_plain = forces(fish)
-    assert of_plain.unit.missing == ("length", "radius", "depth")
+    plain, _ = forces(fish)
     known, _ = forces(fish, Sizes(length=0.1, depth=0.05, frequency=3.0))
     drag = 2710 * 0.05 / 0.0762 * 2 * 0.006 * 0.1
     scales = {
@@ -249,12 +210,6 @@ def test_newtons_and_watts_follow_from_sizes():
         expected = scale * plain[name].values
         np.testing.assert_allclose(known[name].values, expected, rtol=1e-12)
         assert known[name].unit == unit
-    told, _ = forces(fish, Sizes(length=0.1, stress=500.0))
-    expected = 500 * 2 * 0.006 * 0.1 * plain["drag_ends"].values
-    np.testing.assert_allclose(told["drag_ends"].values, expected)
-    assert (told["medium_power"].unit, told["power"].unit) == ("J/rad", "N/rad")
-    _, of_fluid = forces(PLAIN.changed(body=Chain(length=0.3)))
-    assert of_fluid.unit.missing == ("radius", "stress")
 
 
 def small_steps():
@@ -308,24 +263,3 @@ def test_errors_cover_what_finer_numerics_change(scene):
         assert (off <= found[name].error + 1e-9).mean() >= 0.9, name
         mean = found[name].error.mean()
         assert off.mean() <= mean < largest * off.mean() + 1e-9, name
-
-
-def test_a_stroke_that_goes_nowhere_says_so():
-    gait = Wave(0.5, waves=0.0, joints=2)
-    still = geomech.study(SAND, Chain((1, 1, 1)), gait, phases=16).forces()
-    said = "no net displacement; forwards is where the frame points"
-    assert said in repr(still)
-
-
-def test_pictures_show_the_numbers():
-    result, _ = forces(FISH.with_numerics(phases=24))
-    first, second, *_ = geomech.plots.forces_figure(result).axes
-    image = first.collections[0]
-    forward = result["forward"].values
-    np.testing.assert_allclose(image.get_array()[:-1], forward)
-    assert image.get_clim()[1] == np.abs(forward).max()
-    tops = [c.get_paths()[0].vertices[:, 1].max() for c in second.collections]
-    assert max(tops) == pytest.approx(result["thrust_normal"].values.max())
-    power = geomech.plots.forces_figure(result, ("power",), clim="90%").axes[0]
-    limit = np.percentile(result["power"].values, 90)
-    assert power.collections[0].get_clim()[1] == pytest.approx(limit)

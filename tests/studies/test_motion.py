@@ -8,12 +8,11 @@ import signal
 
 import numpy as np
 import pytest
-from matplotlib.collections import QuadMesh
 from PIL import Image, ImageSequence
 from registry import BODIES, SYSTEMS
 
-from geomech import plots, scenes
-from geomech.mathematics.gaits import Circle, Ellipse, Sine
+from geomech import plots
+from geomech.mathematics.gaits import Circle, Ellipse
 from geomech.mathematics.geometry import reconstruct
 from geomech.mathematics.systems import NoSlipSnake, Solver, Swimmer
 from geomech.mathematics.systems.capabilities import solver_of
@@ -23,7 +22,6 @@ from geomech.scenes import Numerics, Scene
 from geomech.studies.mechanics.motion import compute_motion
 from geomech.studies.scene_tables import SceneTables
 from rft import (
-    Backbone,
     BodyInertia,
     Chain,
     ConstantCurvature,
@@ -80,26 +78,20 @@ def test_points_are_the_links_in_the_world(name, length, frame):
     alpha = rng.uniform(-2, 2, (2, 3, body.joints))
     pose = rng.uniform(-4, 4, (3, 3))
     points = body.points(alpha, pose)
-    assert points.shape == (2, 3, len(lengths) + 1, 2)
     for k in np.ndindex(2, 3):
         bends = bends_of(body, alpha[k])
         expected = drawn(lengths, bends, length, frame, pose[k[1]])
         np.testing.assert_allclose(points[k], expected, atol=1e-13)
-    here = drawn(lengths, bends, length, frame, np.zeros(3))
-    np.testing.assert_allclose(body.points(alpha[1, 2]), here, atol=1e-13)
 
 
 @pytest.mark.parametrize("n", [3, 8, 9, 40])
 def test_poses_are_the_trajectory_at_the_samples(n):
-    """Without rotation, with half turns and with many turns per cycle."""
     xi = np.random.default_rng(1).normal(size=(6, n, 3))
-    xi[0, :, 2] -= xi[0, :, 2].mean()
     xi[..., 2] += np.array([0.0, 0.3, 0.5, -1.0, 3.2, 40.0])[:, None]
     poses = reconstruct.poses(xi)
     phases = 2 * np.pi * np.arange(n + 1) / n
     path = reconstruct.trajectory(xi, phases)
     np.testing.assert_allclose(poses, path, atol=1e-12)
-    np.testing.assert_allclose(poses[:, -1], reconstruct.displacement(xi), atol=1e-12)
 
 
 OVAL = Ellipse(semi_axes=(0.9, 0.5), centre=(0.2, -0.1), tilt=0.3)
@@ -137,16 +129,12 @@ def test_a_cycle_ends_where_the_direct_tier_says(name):
     net = SceneTables(scene).poses("direct")
     one = compute_motion(scene)
     two = compute_motion(scene, 2)
-    np.testing.assert_array_equal(one.pose[0], 0.0)
     np.testing.assert_allclose(one.pose[-1], net, atol=1e-13)
     np.testing.assert_allclose(two.pose[:n], one.pose[:n], atol=1e-13)
     # The end of a cycle is foreseen, with an error of order 2 in 1/phases; where
     # another cycle follows it is solved for.
     tolerance = 1e-13 if name in REPEATING else 5e-3
     np.testing.assert_allclose(two.pose[n], net, atol=tolerance)
-    phase = np.linspace(0, 4 * np.pi, 2 * n + 1)
-    np.testing.assert_allclose(two.phase, phase, atol=1e-13)
-    np.testing.assert_allclose(two.alpha, scene.gait.shape(phase), atol=1e-13)
     again = se2.compose(net, one.pose)
     is_repeated = np.allclose(two.pose[n:], again, rtol=0, atol=1e-12)
     assert is_repeated == (name in REPEATING)
@@ -182,28 +170,7 @@ def test_wheels_do_not_slip_in_the_world(frame):
     centre = ((rate[:, 1:] + rate[:, :-1]) / 2)[4:-4]
     along = np.diff(ends, axis=1)[4:-4]
     across = centre[..., 1] * along[..., 0] - centre[..., 0] * along[..., 1]
-    assert np.abs(centre).max() > 0.02
-    assert np.abs(across).max() < 1e-10
-    lengths = np.linalg.norm(along, axis=-1)
-    expected = np.broadcast_to(0.4 * np.array([0.8, 1.3, 1.0]) / 3.1, lengths.shape)
-    np.testing.assert_allclose(lengths, expected, rtol=1e-12)
-
-
-@pytest.mark.parametrize("name", ["swimmer", "no-slip", "second on a slope"])
-def test_a_table_reads_back_with_every_digit(name, tmp_path):
-    motion = compute_motion(SCENES[name], 2)
-    Trajectory(SCENES[name], 2).ask().save(tmp_path / "out.csv")
-    table = np.genfromtxt(tmp_path / "out.csv", delimiter=",", names=True)
-
-    def columns(*names):
-        return np.stack([table[name] for name in names], -1)
-
-    np.testing.assert_array_equal(columns("x", "y", "heading"), motion.pose)
-    np.testing.assert_array_equal(columns("alpha_1", "alpha_2"), motion.alpha)
-    np.testing.assert_array_equal(table["phase"], motion.phase)
-    ends = columns(*(f"end_{k}_{axis}" for k in range(4) for axis in "xy"))
-    np.testing.assert_array_equal(ends.reshape(-1, 4, 2), motion.points())
-    assert "time" not in table.dtype.names
+    assert np.abs(across).max() < 1e-10 < 0.02 < np.abs(centre).max()
 
 
 TURNING = Ellipse(semi_axes=(0.8, 0.5))
@@ -211,32 +178,11 @@ BODY = Chain((1, 1.4, 0.8))
 SMALL = Scene(Swimmer(SAND, BODY), TURNING, Numerics(grid=9, phases=32), "small")
 
 
-def test_a_gait_with_a_frequency_has_times():
-    scene = SMALL.changed(gait=dataclasses.replace(TURNING, frequency=2.5))
-    result = Trajectory(scene, 3).ask()
-    seconds = np.linspace(0, 3 / 2.5, 97)
-    np.testing.assert_allclose(result["time"].values, seconds)
-    assert list(result.only("time", "x")) == ["phase", "time", "x"]
-    titles = [ax.get_title("left") for ax in result.plot().axes]
-    assert titles[1].endswith(f"t = {seconds[19]:.3g} s")
-
-
 def test_a_table_longer_than_a_piece_of_text_is_written_whole(tmp_path):
     result = Trajectory(SCENES["swimmer"], 400, mapped=False).ask()
     result.save(tmp_path / "out.csv")
     x = np.genfromtxt(tmp_path / "out.csv", delimiter=",", names=True)["x"]
     np.testing.assert_array_equal(x, result["x"].values)
-
-
-@pytest.mark.parametrize("cycles", [1, 3])
-def test_the_final_pose_says_what_a_symmetry_makes_zero(cycles):
-    mirrored = Trajectory(scenes.load("three-link-viscous"), cycles).ask()
-    assert mirrored["final_heading"].zero.startswith("by symmetry, as")
-    assert abs(float(mirrored["final_heading"])) < 1e-12
-    assert not mirrored["final_x"].zero
-    turning = Trajectory(SCENES["swimmer"], cycles).ask()
-    assert not turning["final_heading"].zero
-    assert float(turning["final_x"]) == turning["x"].values[-1]
 
 
 @pytest.fixture(scope="module")
@@ -247,20 +193,13 @@ def chain():
 def test_a_film_shows_body_track_and_shape():
     motion = compute_motion(SMALL, 2)
     rows = films.rows(32, 2)
-    fig, put = plots.stage(Trajectory(SMALL, 2).ask(), rows, caption="0.5 × real time")
-    world, shapes = fig.axes[:2]
+    _, put = plots.stage(Trajectory(SMALL, 2).ask(), rows)
     for row in (0, 20, 51):
-        track, body, head, dot, text = put(row)
+        track, body, head, dot, _ = put(row)
         np.testing.assert_array_equal(track.get_xydata(), motion.pose[: row + 1, :2])
         np.testing.assert_array_equal(body.get_xydata(), motion.points()[row])
         np.testing.assert_array_equal(head.get_xydata(), motion.points()[row, -1:])
         np.testing.assert_array_equal(dot.get_xydata(), motion.alpha[row : row + 1])
-        assert text.get_text() == f"cycle {row / 32:.2f}"
-        assert (body.axes, dot.axes) == (world, shapes)
-    (mesh,) = (c for c in shapes.collections if isinstance(c, QuadMesh))
-    ccf = SceneTables(SMALL).curvature.values[0]
-    np.testing.assert_array_equal(np.ravel(mesh.get_array()), ccf.T.ravel())
-    assert (world.get_aspect(), world.get_title("right")) == (1.0, "0.5 × real time")
 
 
 @pytest.mark.parametrize(
@@ -279,74 +218,16 @@ def test_films_are_in_real_time_or_tell_their_speed(frequency, cycle, caption):
     pace = films.pace(frequency)
     assert (pace.cycle, pace.caption) == (pytest.approx(cycle), caption)
     rows = films.rows(256, 3, frequency)
-    assert len(rows) <= 302
-    assert len(rows) / pace.rate == pytest.approx(3 * cycle, abs=1.0 / pace.rate)
     expected = np.arange(len(rows)) / pace.rate / cycle * 256
     np.testing.assert_allclose(rows, expected, atol=1.0)
 
 
-def test_a_gif_takes_as_long_as_it_says_and_moves(chain, tmp_path, monkeypatch):
-    told = []
-    monkeypatch.setattr(
-        films, "progress_bar", lambda _: contextlib.nullcontext(told.append)
-    )
+def test_a_gif_takes_as_long_as_it_says(chain, tmp_path):
     chain.save(tmp_path / "out.gif")
-    assert (len(told), told[-1]) == (50, 1.0)
     with Image.open(tmp_path / "out.gif") as film:
         assert film.n_frames in (32, 33)  # a picture shown twice is stored once
         durations = [x.info["duration"] for x in ImageSequence.Iterator(film)]
-        assert sum(durations) == 2000
-        assert film.size == (800, 360)
-        pictures = []
-        for k in (0, 10):
-            film.seek(k)
-            pictures.append(np.array(film.convert("RGB"), int))
-    moved = (np.abs(pictures[1] - pictures[0]).sum(-1) > 60).any(0)
-    red = (np.abs(pictures[0] - [209, 73, 91]).sum(-1) < 40).any(0)  # head and point
-    for half in (slice(0, 400), slice(400, 800)):
-        assert moved[half].any()
-        assert red[half].any()
-
-
-def test_a_strip_numbers_bodies_and_shapes_alike(chain):
-    motion = compute_motion(SMALL)
-    rows = np.linspace(0, 32, 6).round().astype(int)
-    fig = chain.plot()
-    pictures = [ax for ax in fig.axes if "cycle" in ax.get_title("left")]
-    for k, (ax, row) in enumerate(zip(pictures, rows, strict=True)):
-        assert ax.get_title("left") == rf"$\bf{{{k + 1}}}$  cycle {row / 32:.2f}"
-        np.testing.assert_array_equal(ax.lines[2].get_xydata(), motion.points()[row])
-        assert ax.get_xlim() == pictures[0].get_xlim()
-    texts = [text for ax in fig.axes for text in ax.texts]
-    numbered = [text for text in texts if text.get_text()[:1].isdigit()]
-    names = [text.get_text() for text in numbered]
-    assert names == ["1,6", "2", "3", "4", "5"]
-    places = [text.xy for text in numbered]
-    np.testing.assert_allclose(places, motion.alpha[rows[:5]], atol=1e-8)
-
-
-def test_many_angles_are_a_map_of_curvature_over_phase_and_body():
-    body = Backbone(12, length=0.3)
-    scene = Scene(Swimmer(SAND, body), Sine(elements=12), Numerics(phases=16))
-    motion = compute_motion(scene, 2)
-    fig, put = plots.stage(Trajectory(scene, 2).ask(), films.rows(16, 2))
-    *_, mark, _ = put(21)
-    np.testing.assert_allclose(mark.get_xdata(), 5 / 16)
-    (mesh,) = (c for c in fig.axes[1].collections if isinstance(c, QuadMesh))
-    curvature = motion.alpha[:17].T * 12 / 0.3
-    found = np.reshape(mesh.get_array(), curvature.shape)
-    np.testing.assert_allclose(found, curvature, rtol=1e-9)
-
-
-def test_a_system_without_a_body_is_an_arrow():
-    scene = Scene(SYSTEMS["differential-drive"], OVAL, Numerics(phases=24))
-    motion = compute_motion(scene)
-    assert motion.points() is None
-    _, put = plots.stage(Trajectory(scene, mapped=False).ask(), films.rows(24, 1))
-    arrow = put(7)[1].get_xydata()
-    np.testing.assert_allclose(arrow.mean(0), motion.pose[7, :2], atol=1e-14)
-    x, y = arrow[1] - arrow[0]
-    assert np.arctan2(y, x) == pytest.approx(motion.pose[7, 2])
+    assert sum(durations) == 2000
 
 
 FFMPEG = """#!/bin/sh
@@ -379,7 +260,6 @@ def test_an_mp4_hands_its_pictures_to_ffmpeg(chain, ffmpeg, tmp_path):
     raw = np.fromfile(tmp_path / "out.mp4", np.uint8).reshape(-1, 360, 800, 3)
     assert "-s 800x360" in said.read_text()
     assert len(raw) == len(films.rows(32, 1))
-    assert (raw[0, 0, 0] == 255).all()
     assert (raw[0] != raw[10]).any()
 
 
@@ -388,15 +268,6 @@ def test_an_mp4_says_what_it_lacks(tmp_path, monkeypatch):
     lacks = "takes ffmpeg, which is not installed; end the name in .gif"
     with pytest.raises(Refusal, match=lacks):
         films.check_format(tmp_path / "out.mp4")
-
-
-@pytest.mark.parametrize("read", ['cat > /dev/null; echo "first" >&2; ', ""])
-def test_an_mp4_that_ffmpeg_refuses_is_not_left(read, chain, ffmpeg, tmp_path):
-    ffmpeg(f"{read}echo no such codec >&2; exit 1")
-    refused = "cannot write out.mp4: ffmpeg failed: no such codec; end the name in .gif"
-    with pytest.raises(Refusal, match=refused):
-        chain.save(tmp_path / "out.mp4")
-    assert [p.name for p in tmp_path.iterdir()] == ["bin"]
 
 
 @pytest.mark.parametrize("ending", ["gif", "mp4"])
