@@ -10,9 +10,9 @@ import timeit
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import fsolve
 
 from figures import main, style
+from figures.peers import one_scipy_solve
 from geomech import plots
 from geomech.mathematics.gaits import Circle
 from geomech.mathematics.geometry import connection
@@ -24,36 +24,6 @@ GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 NAMES = {"numpy": "NumPy", "numba": "compiled"}
 LOOKS = {"NumPy": (style.BLUE, "o"), "compiled": (style.VERMILION, "s")}
 REPEATS = 3
-TAN2 = np.tan(np.radians(13.8)) ** 2
-C = 1.8
-
-
-def one_scipy_solve(alpha, alphadot, elements=20):
-    """Return one balance solved in the plainest way: midpoint elements in the middle
-    link's frame, Eqs. 2-3 as printed, fsolve."""
-    half = 1 / 6
-    s = ((np.arange(elements) + 0.5) / elements * 2 - 1) * half
-    headings = np.array([-alpha[0], 0.0, alpha[1]])
-    turns = np.array([-alphadot[0], 0.0, alphadot[1]])
-    t = np.stack([np.cos(headings), np.sin(headings)], -1)[:, None]
-    n = np.stack([-t[..., 1], t[..., 0]], -1)
-    joints = np.array([[-half, 0.0], [0.0, 0.0], [half, 0.0]])[:, None]
-    arms = (s + np.array([-half, 0.0, half])[:, None])[..., None] * t
-    place = joints + arms
-
-    def force(xi):
-        spin = xi[2] * np.stack([-place[..., 1], place[..., 0]], -1)
-        swing = turns[:, None, None] * np.stack([-arms[..., 1], arms[..., 0]], -1)
-        v = xi[:2] + spin + swing
-        v = v / (np.sqrt((v**2).sum(-1, keepdims=True)) + 1e-12)
-        vn = (v * n).sum(-1, keepdims=True)
-        vt = (v * t).sum(-1, keepdims=True)
-        f = (1 + C / np.sqrt(TAN2 + vn**2)) * vn * n + vt * t
-        moment = place[..., 0] * f[..., 1] - place[..., 1] * f[..., 0]
-        return [f[..., 0].sum(), f[..., 1].sum(), moment.sum()]
-
-    # The start is not zero, where a link may stand still.
-    return fsolve(force, [0.02, 0.01, 0.1], full_output=True)
 
 
 def backends() -> list[str]:

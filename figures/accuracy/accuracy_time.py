@@ -1,0 +1,284 @@
+"""Accuracy against computing time: the displacement of the built-in swimmer by every
+tier, by NumPy and compiled, with and without its error estimate, beside two programs
+that do not use this package.
+
+The numbers of a point are those of five amplitudes. A few phases a cycle may happen to
+meet the kinks of dry friction well or badly: the direct tier and the other programs
+begin the cycle at several first phases, of which the bands show all.
+"""
+
+from __future__ import annotations
+
+import functools
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+import geomech
+from figures import main, peers, style
+from figures.accuracy.cost_scaling import NAMES, backends
+from geomech import plots
+from geomech.mathematics.geometry.reconstruct import displacement
+from geomech.scenes import load
+from geomech.studies.displacement.tiered import AMPLITUDE_FRACTIONS
+from geomech.studies.estimates import estimate
+from geomech.studies.scene_tables import SceneTables
+from rft import Granular
+from rft.balance.backend import preferring
+from rft.formulas import se2
+
+SCENE = "three-link-glass"
+PHASES = (8, 16, 32, 64, 128, 256, 512)
+FEWEST = 32  # phases of an error estimate
+FINE = 6144  # phases of the truth, a multiple of all counts of phases and first phases
+PEERS = {
+    "a loop of fsolve, 20 midpoints a link": (peers.by_fsolve, (8, 16, 32)),
+    "a plain loop compiled by numba": (None, PHASES),
+}
+TIERS = {
+    "adapted: curves": "adapted tier",
+    "harmonic: grid": "harmonic tier",
+    "path: grid": "path tier",
+    "area: grid": "area tier",
+}
+
+
+def compute(
+    phases: tuple[int, ...] = PHASES,
+    starts: int = 12,
+    runs: int = 5,
+    tiers: bool = True,
+) -> dict:
+    """Return errors (body lengths, rms over amplitudes) and CPU seconds.
+
+    direct: {back end: {"phases", "error" (P, starts), "seconds" (P,)}}. estimated:
+    {back end: {"phases", "seconds"}}, with the error estimate. peers: {name: as of
+    direct}. tiers: {back end: {label: {"value", "error", "seconds"}}}. Times are the
+    shortest of ``runs``; those of starts other than the first are not taken."""
+    scene = load(SCENE)
+    scene = scene.changed(medium=Granular(peers.C, peers.GAMMA0))
+    amplitudes = scene.gait.amplitude * AMPLITUDE_FRACTIONS
+    with preferring(backends()[-1]):
+        truth = Truth(scene.with_numerics(regularisation=1e-9), amplitudes)
+    found: dict = {"direct": {}, "estimated": {}, "peers": {}, "tiers": {}}
+    for name in backends():
+        with preferring(name):
+            found["direct"][name] = by_direct_tier(
+                scene, amplitudes, truth, phases, starts, runs
+            )
+            found["estimated"][name] = with_estimates(scene, amplitudes, phases, runs)
+            if tiers:
+                found["tiers"][name] = by_tiers(scene, runs)
+    for name, (solve, counts) in PEERS.items():
+        if solve is None and "numba" not in backends():
+            continue
+        solve = solve or peers.plain_loop()
+        counts = [n for n in counts if n in phases]
+        found["peers"][name] = by_peer(
+            solve, scene, amplitudes, truth, counts, starts, runs
+        )
+    return found
+
+
+class Truth:
+    """Net poses of cycles that begin at any of FINE phases."""
+
+    def __init__(self, scene, amplitudes):
+        self.alpha, self.alphadot = scene.gait.cycle(FINE, amplitudes)
+        self.xi = scene.system.velocity(self.alpha, self.alphadot)
+
+    def net(self, first: int) -> np.ndarray:
+        """Return the net poses (B, 3) of cycles that begin with the phase ``first``."""
+        return displacement(np.roll(self.xi, -first, 1))
+
+    def error(self, net: np.ndarray, first: int) -> float:
+        """Return the rms distance over amplitudes of net poses from the true ones."""
+        return float(np.sqrt(np.mean(estimate.distance(net, self.net(first)) ** 2)))
+
+
+def quickest(compute: Callable, runs: int) -> float:
+    """Return the CPU seconds of the quickest of several runs."""
+    seconds = []
+    for _ in range(runs):
+        start = time.process_time()
+        compute()
+        seconds.append(time.process_time() - start)
+    return min(seconds)
+
+
+def first_phases(count: int, starts: int) -> list[int]:
+    """Return numbers of first phases among FINE, evenly within the first of ``count``
+    steps."""
+    return [FINE * k // (count * starts) for k in range(starts)]
+
+
+def by_direct_tier(scene, amplitudes, truth, phases, starts, runs) -> dict:
+    """Return errors and seconds of the direct tier."""
+    errors = []
+    seconds = []
+    for count in phases:
+        one = scene.with_numerics(phases=count)
+        row = []
+        for first in first_phases(count, starts):
+            part = slice(first, None, FINE // count)
+            run = one.system.run(truth.alpha[:, part], truth.alphadot[:, part])
+            row.append(truth.error(run.net, first))
+        errors.append(row)
+
+        def answer(one=one):
+            return SceneTables(one).poses("direct", None, amplitudes)
+
+        seconds.append(quickest(answer, runs))
+    return {"phases": list(phases), "error": errors, "seconds": seconds}
+
+
+def with_estimates(scene, amplitudes, phases, runs) -> dict:
+    """Return seconds of the direct tier with its error estimate."""
+    counts = [count for count in phases if count >= FEWEST]
+    seconds = []
+    for count in counts:
+        answer = functools.partial(
+            estimate.direct, scene, scene.gait, amplitudes, count
+        )
+        seconds.append(quickest(answer, runs))
+    return {"phases": counts, "seconds": seconds}
+
+
+def by_tiers(scene, runs) -> dict:
+    """Return values, errors and seconds of the settings of other tiers."""
+    result = geomech.accuracy(scene, runs=runs)
+    found = {}
+    for k, setting in enumerate(result["setting"].values):
+        label = TIERS.get(str(setting))
+        if label is None:
+            continue
+        is_run = np.isfinite(result["value"].values[k])
+        found[label] = {
+            name: result[name].values[k][is_run].tolist()
+            for name in ("value", "error", "seconds")
+        }
+    return found
+
+
+def by_peer(solve, scene, amplitudes, truth, counts, starts, runs) -> dict:
+    """Return errors and seconds of another program, whose velocities are those of the
+    middle link and are integrated as ours are."""
+
+    def nets(count, first):
+        part = slice(first, None, FINE // count)
+        found = []
+        for alpha, alphadot in zip(truth.alpha[:, part], truth.alphadot[:, part]):
+            net = displacement(solve(alpha, alphadot))
+            found.append(in_mean_frame(net, alpha[0]))
+        return np.array(found)
+
+    errors = []
+    seconds = []
+    for count in counts:
+        begun = first_phases(count, starts)
+        errors.append([truth.error(nets(count, first), first) for first in begun])
+        seconds.append(quickest(functools.partial(nets, count, 0), runs))
+    return {"phases": counts, "error": errors, "seconds": seconds}
+
+
+def in_mean_frame(net: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+    """Return the net pose (3,) of the mean frame from that of the middle link, with the
+    shape at the start of the cycle."""
+    half = peers.HALF
+    low = np.array([-half * (1 + np.cos(alpha[0])), half * np.sin(alpha[0])])
+    high = np.array([half * (1 + np.cos(alpha[1])), half * np.sin(alpha[1])])
+    place = (low + high) / 3
+    mean = np.array([*place, (alpha[1] - alpha[0]) / 3])
+    return se2.compose(se2.inverse(mean), se2.compose(net, mean))
+
+
+# Looks by program: colour and marker.
+LOOKS = {"numpy": (style.BLUE, "o"), "numba": (style.VERMILION, "s")}
+PEER_LOOKS = (("0.5", "x"), (style.BLACK, "^"))
+TIER_LOOKS = {
+    "direct tier": (style.VERMILION, "s"),
+    "adapted tier": (style.PINK, "D"),
+    "harmonic tier": (style.GREEN, "^"),
+    "path tier": (style.BLACK, "v"),
+    "area tier": ("0.55", "<"),
+}
+MARKED = (8, 32, 128, 512)  # phases that are written beside a curve
+
+
+@plots.styled
+def draw(numbers: dict):
+    """Draw the force balance by several programs at the left, tiers at the right."""
+    fig, axes = plots.figure(8.6, 4.6, 2)
+    left, right = axes[0]
+    right.sharex(left)
+    right.sharey(left)
+    for name, found in numbers["direct"].items():
+        label = f"direct tier, {NAMES[name]}"
+        draw_band(left, found, label, *LOOKS[name])
+        draw_estimated(left, found, numbers["estimated"][name], *LOOKS[name])
+    for look, (name, found) in zip(PEER_LOOKS, numbers["peers"].items()):
+        draw_band(left, found, name, *look)
+    write_phases(left, [*numbers["direct"].values()][-1])
+    style.add_entry(left, "with its error estimate", ls="--", marker="s", mfc="white")
+    left.set(title="the force balance", ylabel="error of the displacement (BL)")
+
+    draw_tiers(right, numbers)
+    right.set_title("the tiers, with their tables")
+    for ax in (left, right):
+        ax.set_xlabel("CPU time for five amplitudes (s)")
+        style.draw_grid(ax)
+        ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16))
+    low, high = left.get_xlim()
+    left.set_xlim(0.4 * low, high)
+    return fig
+
+
+def draw_tiers(ax, numbers: dict) -> None:
+    """Draw errors of the tiers against seconds, of NumPy with open markers."""
+    names = [*numbers["direct"]]
+    for name in names:
+        direct = numbers["direct"][name]
+        median = np.median(direct["error"], 1)
+        lines = {"direct tier": {"error": median, "seconds": direct["seconds"]}}
+        for label, found in (lines | numbers["tiers"].get(name, {})).items():
+            colour, marker = TIER_LOOKS[label]
+            look = {"color": colour, "marker": marker, "ms": 4}
+            if name == names[-1]:
+                look["label"] = label
+            else:
+                look |= {"mfc": "white", "ls": ":"}
+            ax.loglog(found["seconds"], found["error"], **look)
+    if len(names) > 1:
+        style.add_entry(ax, "the same by NumPy", ls=":", marker="o", mfc="white")
+
+
+def draw_band(ax, found: dict, label: str, colour: str, marker: str) -> None:
+    """Draw the median error over first phases against seconds, and the band of all."""
+    error = np.array(found["error"])
+    seconds = np.array(found["seconds"])
+    ax.fill_between(seconds, error.min(1), error.max(1), color=colour, alpha=0.18, lw=0)
+    middle = np.median(error, 1)
+    ax.loglog(seconds, middle, color=colour, marker=marker, ms=5, label=label)
+
+
+def draw_estimated(ax, found: dict, estimated: dict, colour: str, marker: str) -> None:
+    """Draw the same errors against the seconds that they take with their estimate."""
+    middle = np.median(found["error"], 1)
+    rows = [found["phases"].index(count) for count in estimated["phases"]]
+    look = {"color": colour, "marker": marker, "mfc": "white", "ls": "--", "ms": 4}
+    ax.loglog(estimated["seconds"], middle[rows], **look)
+
+
+def write_phases(ax, found: dict) -> None:
+    """Write numbers of phases beside the points of a curve."""
+    middle = np.median(found["error"], 1)
+    for count, seconds, error in zip(found["phases"], found["seconds"], middle):
+        if count in MARKED:
+            text = f"{count} phases" if count == MARKED[0] else f"{count}"
+            place = {"xytext": (-6, -4), "textcoords": "offset points"}
+            ax.annotate(text, (seconds, error), ha="right", **style.NOTE, **place)
+
+
+if __name__ == "__main__":
+    main("accuracy_time", compute, draw)
