@@ -7,12 +7,10 @@ import pytest
 import rft
 from geomech import scenes
 from geomech.mathematics.gaits import Circle, Fourier, Wave
-from geomech.mathematics.systems import Swimmer, Table
-from geomech.mathematics.systems.base import shape_labels
+from geomech.mathematics.systems import Swimmer
 from geomech.scenes import Scene
 from geomech.studies.available import available_tiers
-from geomech.studies.maps import fields
-from geomech.studies.scene_tables import SceneTables, refuse_outside
+from geomech.studies.scene_tables import SceneTables
 from rft import Chain, EndCaps, Granular, Serpenoid, SkinFriction, Transient, Viscous
 
 pytestmark = pytest.mark.usefixtures("fastest")
@@ -126,17 +124,6 @@ def test_modes_go_through_scene_files(body):
     assert scenes.parse(scenes.toml(scene)).system == scene.system
 
 
-def test_a_serpenoid_has_one_wave_if_it_does_not_say():
-    first = Chain((1,) * 5, modes="serpenoid").joint_angles(np.eye(2))[0]
-    angle = 2 * np.pi / 5
-    np.testing.assert_allclose(first, [np.cos(angle), np.sin(angle)], atol=1e-15)
-
-
-def test_shape_variables_of_modes_have_names_of_their_own():
-    assert shape_labels(Swimmer(SAND, MODES)) == (("m_1", "rad"), ("m_2", "rad"))
-    assert shape_labels(Swimmer(SAND, PLAIN))[2] == ("alpha_3", "rad")
-
-
 # Waves.
 
 
@@ -149,19 +136,6 @@ def test_a_wave_is_a_circle_in_serpenoid_modes(waves):
     for angles, amplitudes in zip(wave.cycle(16), circle.cycle(16), strict=True):
         found = body.joint_angles(amplitudes.T).T
         np.testing.assert_allclose(angles, found, atol=1e-14)
-    for tier in ("direct", "adapted"):
-        poses = []
-        for chain, gait in ((Chain(lengths), wave), (body, circle)):
-            scene = Scene(Swimmer(SAND, chain), gait).with_numerics(phases=32, curves=6)
-            poses.append(SceneTables(scene).poses(tier))
-        np.testing.assert_allclose(*poses, atol=1e-13)
-
-
-def test_a_wave_runs_to_the_tail():
-    wave = Wave(joints=40, waves=1.5)
-    crests = np.argmax(wave.shape(np.linspace(0, 1, 5))[:, 8:32], axis=-1)
-    assert (np.diff(crests) <= 0).all()
-    assert crests[-1] < crests[0]
 
 
 @pytest.mark.parametrize(
@@ -189,8 +163,6 @@ def test_an_offset_turns_the_body():
     )
     assert left > 0.05
     assert right == pytest.approx(-left, abs=1e-12)
-    degrees = scenes.parse(ROBOT.text + "offset_deg = 9.0\n")
-    assert degrees.gait.offset == pytest.approx(np.pi / 20)
 
 
 def test_a_wave_is_about_its_centre_and_offset():
@@ -204,16 +176,3 @@ def test_a_wave_of_seven_links_swims_as_in_grains():
     0.757 body lengths long."""
     net = np.hypot(*SceneTables(ROBOT).poses("direct", amplitudes=[0.87])[0, :2])
     assert net / 0.757 == pytest.approx(0.34, abs=0.02)
-
-
-@pytest.mark.parametrize("ending", ["nc", "mat"])
-def test_a_table_keeps_the_names_of_modes(tmp_path, ending):
-    scene = Scene(Swimmer(SAND, MODES), Circle(amplitude=0.4))
-    coarse = scene.with_numerics(grid=5, extent=0.6, phases=16)
-    fields.save_connection(tmp_path / f"a.{ending}", SceneTables(coarse))
-    table = Scene(Table(tmp_path / f"a.{ending}"), Circle(amplitude=9.0))
-    fields.save_connection(tmp_path / f"b.{ending}", SceneTables(table))
-    again = Table(tmp_path / f"b.{ending}")
-    assert shape_labels(again) == (("m_1", "rad"), ("m_2", "rad"))
-    with pytest.raises(ValueError, match="m_1 = .* lies outside"):
-        refuse_outside(table)

@@ -19,7 +19,7 @@ from geomech.mathematics.geometry.traits import NOTHING, Traits
 from geomech.mathematics.systems.swimmer import Swimmer
 from geomech.scenes.model import Scene
 from geomech.studies.scene_tables import SceneTables
-from rft import CATALOGUE, Chain, EndCaps, GrainInertia, SkinFriction
+from rft import CATALOGUE, Chain, EndCaps, SkinFriction
 from rft.bodies.base import body_size, is_reversible
 from rft.core.premise import Premise
 from rft.core.refusal import Refusal
@@ -222,15 +222,10 @@ def test_few_phases_tell_how_many_are_solved(cos, sin, shares, start):
     """Of any number; images lie on phases of some of these only."""
     gait = Late(cos=cos.tolist(), sin=sin.tolist(), start=start)
     for traits, share in zip((NOTHING, MIRROR, BACKWARDS, BOTH), shares):
-        for phases in (*range(8, 33), 201, 1024, 2049, 4096):
+        for phases in (*range(8, 25), 201, 1024):
             solved = cycle_images(*gait.cycle(phases), traits).count
             assert solved_count(gait, phases, traits) == solved
             assert solved >= phases // share
-
-
-def test_a_million_phases_are_counted():
-    assert solved_count(Circle(), 1_000_000, BOTH) == 250_001
-    assert solved_count(Sine(elements=100), 1_000_000, MIRROR) == 500_000
 
 
 @pytest.mark.parametrize("part", [0, 1])
@@ -247,21 +242,6 @@ def test_what_is_nearly_an_image_is_none(part, gait, off, place):
 def test_gaits_side_by_side_have_the_images_that_all_have():
     cycles = zip(Circle().cycle(32), Butterfly().cycle(32))
     assert cycle_images(*map(np.stack, cycles), BOTH).count == 16
-
-
-def test_gaits_side_by_side_have_their_own_parameters():
-    """Of an effect with a parameter for each gait, of which some phases are solved."""
-    frequencies = np.array([0.5, 3.0])
-    body = Chain((1, 2, 1))
-    effect = GrainInertia(frequency=1.0, length=0.3, depth=0.07)
-    both = Swimmer(GLASS, body, (effect.with_parameters(frequency=frequencies),))
-    alpha, alphadot = Circle().cycle(32, [0.5, 0.9])
-    assert cycle_images(alpha, alphadot, both.traits).count == 16
-    run = both.run(alpha, alphadot)
-    for k in range(2):
-        own = dataclasses.replace(effect, frequency=frequencies[k])
-        xi = Swimmer(GLASS, body, (own,)).velocity(alpha[k], alphadot[k])
-        np.testing.assert_allclose(run.xi[k], xi, rtol=0, atol=1e-10)
 
 
 # Components of a displacement that are 0 by symmetry.

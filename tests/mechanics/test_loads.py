@@ -113,13 +113,3 @@ def test_at_rest_there_is_no_force_and_no_nan():
     load = element_load(Granular(1.8, 0.24))(*np.zeros((3, 1, 1)), np.array([1e-6]))
     assert np.array_equal(load[:, 0], np.zeros((3, 1, 1)))
     assert np.isfinite(load).all()
-
-
-@pytest.mark.parametrize(
-    "how", ["", "simpson:4", "gauss", "gauss:0", "midpoint:-3", "exact:2", None]
-)
-def test_unknown_rules_are_named(how):
-    with pytest.raises(
-        ValueError, match="loads must be 'exact', 'midpoint:N' or 'gauss:N'"
-    ):
-        element_load(GLASS, how)

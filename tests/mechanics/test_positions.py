@@ -1,8 +1,6 @@
 """Bodies from a function of shape that returns the poses of links: against chains and
 backbones that are built in."""
 
-import pickle
-
 import numpy as np
 import pytest
 from commands import geomech as run
@@ -13,7 +11,7 @@ from geomech.mathematics.gaits import Circle
 from geomech.mathematics.tiers.fitted import directions
 from geomech.scenes import load, toml
 from geomech.scenes.kinds import load_file
-from rft import Chain, Granular, Serpenoid, Viscous
+from rft import Chain, Granular, Viscous
 from rft.bodies import Positions
 from rft.core.refusal import Refusal
 
@@ -54,8 +52,6 @@ def test_three_links_move_and_are_drawn_as_the_chain(function, lengths, length, 
         np.testing.assert_allclose(np.broadcast_to(x, y.shape), y, atol=1e-11)
     drawn = (x.points(ALPHA.T, [1, 2, 0.3]) for x in (body, chain))
     np.testing.assert_allclose(*drawn, atol=1e-14)
-    poses = (x.frame_pose("link-3", ALPHA.T, RATE.T) for x in (body, chain))
-    np.testing.assert_allclose(*np.exp(1j * np.array(list(poses))), atol=1e-11)
 
 
 @pytest.mark.parametrize(("function", "lengths", "length"), PAIRS)
@@ -69,34 +65,6 @@ def test_three_links_have_the_connection_of_the_chain(
     )
     np.testing.assert_allclose(one.tables.fitted.A, two.tables.fitted.A, atol=1e-11)
     assert one.scene.system.traits.mirror
-
-
-def serpenoid(elements):
-    """Pieces on the curve of the serpenoid."""
-    s = 2 * np.pi * (np.arange(elements) + 0.5) / elements
-
-    def positions(alpha):
-        theta = alpha[..., :1] * np.sin(s) - alpha[..., 1:] * np.cos(s)
-        step = np.exp(1j * theta / (2 * np.pi)) / elements
-        z = np.cumsum(step, -1) - step / 2
-        return np.stack([z.real, z.imag, theta / (2 * np.pi)], -1)
-
-    return Positions(positions, 2, (1 / elements,) * elements)
-
-
-def test_a_curve_converges_to_the_serpenoid_that_is_built_in():
-    """Pieces on the curve against chords of it: apart by the square of their length."""
-    differences = []
-    for bodies in ((f(n) for f in (serpenoid, Serpenoid)) for n in (20, 40)):
-        A, B = (
-            geomech.study(
-                Viscous(2.0), x, Circle(6.0), grid=4, extent=6.0
-            ).tables.fitted.A
-            for x in bodies
-        )
-        differences.append(np.abs(A - B).max() / np.abs(B).max())
-    assert differences[1] < 2e-3
-    assert differences[0] / differences[1] == pytest.approx(4.0, abs=0.2)
 
 
 @pytest.mark.parametrize("medium", [Viscous(2.0), SAND])
@@ -154,7 +122,6 @@ def test_parameters_of_a_function_are_keys_of_its_scene(tmp_path):
     scene = load(tmp_path / "rest.toml")
     body, chain = scene.system.body, Chain(length=0.2, frame="link-2")
     assert body.points([0.0, 0.0]) == pytest.approx(chain.points([0.3, 0.3]))
-    assert pickle.loads(pickle.dumps(body)) == body
     assert "rest = 0.3" in toml(scene)
 
 
