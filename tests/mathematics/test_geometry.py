@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 import sympy as sp
-from registry import GAITS, MEDIA
+from registry import MEDIA
 
 from geomech.mathematics import symbolic
 from geomech.mathematics.gaits import Circle, Ellipse, Fourier
@@ -38,17 +38,6 @@ def test_fit_recovers_a_linear_swimmer():
     shapes = np.random.default_rng(0).uniform(-1.8, 1.8, (50, 2))
     exact = np.stack([MIDDLE(shapes, e) for e in np.eye(2)], -1)
     np.testing.assert_allclose(fitted(shapes), exact, atol=2e-6)
-
-
-@pytest.mark.parametrize("joints", [1, 3])
-def test_fit_takes_any_number_of_joints(joints):
-    M = np.random.default_rng(1).normal(size=(3, joints))
-
-    def swimmer(alpha, alphadot):
-        return alphadot @ M.T * np.cos(alpha[..., :1])
-
-    fitted = connection.fit(swimmer, connection.grid(joints, 9, 1.0), 16)
-    np.testing.assert_allclose(fitted(np.zeros(joints)), M, atol=1e-12)
 
 
 def test_fit_residual_is_the_rms_misfit():
@@ -142,14 +131,6 @@ def test_changing_frame_is_solving_in_that_frame(medium, mean, frame):
     h, hdot = mean.frame_pose(frame, alpha, alphadot)
     carried = coordinates.change_velocity(here, h, hdot)
     np.testing.assert_allclose(carried, there, atol=1e-8)
-
-
-@pytest.mark.parametrize("name", GAITS)
-def test_a_reversed_gait_undoes_the_gait(name):
-    forth = GAITS[name]
-    back = dataclasses.replace(forth, reverse=not forth.reverse)
-    g, h = (direct(viscous(), x) for x in (forth, back))
-    np.testing.assert_allclose(se2.compose(g, h), 0, atol=1e-12)
 
 
 @pytest.mark.parametrize("phases", [8, 9])

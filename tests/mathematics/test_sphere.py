@@ -6,7 +6,6 @@ import pytest
 
 from geomech.mathematics.geometry import connection
 from geomech.mathematics.geometry.representations import harmonics
-from geomech.mathematics.geometry.traits import Traits
 from geomech.mathematics.systems import Swimmer
 from rft import CATALOGUE, Chain
 
@@ -42,18 +41,6 @@ def test_polynomials_on_the_sphere_come_back(joints, highest):
     assert table.residual.max() < 1e-10
     half = table.half(0).velocity(alpha, u)[..., 0]
     np.testing.assert_allclose(half, expected[..., 0], atol=1e-10)
-
-
-@pytest.mark.parametrize("joints", [2, 3])
-def test_the_first_degree_is_the_connection(joints):
-    system = Swimmer(GLASS, Chain((0.7, 1.4, 0.9, 0.6)[: joints + 1]))
-    axes = connection.grid(joints, 4, 1.0)
-    fitted = connection.fit(system.velocity, axes, 24, traits=system.traits)
-    traits = Traits(mirror=True)
-    table = harmonics.fit(system.velocity, axes, 24, highest=1, traits=traits)
-    alpha, u = np.random.default_rng(1).uniform(-1, 1, (2, 9, joints))
-    expected = fitted.velocity(alpha, u)
-    np.testing.assert_allclose(table.velocity(alpha, u), expected, atol=1e-12)
 
 
 def test_what_they_leave_is_that_of_other_directions_and_falls():

@@ -13,7 +13,6 @@ from geomech.mathematics.geometry.representations import harmonics
 from geomech.mathematics.geometry.representations.images import (
     cycle_images,
     images,
-    solved_count,
 )
 from geomech.mathematics.geometry.traits import NOTHING, Traits
 from geomech.mathematics.systems.swimmer import Swimmer
@@ -187,45 +186,6 @@ def test_gaits_are_those_of_all_phases(body, effects, gait, amplitudes, phases, 
     np.testing.assert_allclose(run.xi / size, xi / size, rtol=0, atol=1e-10)
     power = swimmer.work(alpha, alphadot, xi).power
     np.testing.assert_allclose(run.work.power, power, rtol=1e-8, atol=1e-12)
-
-
-@dataclasses.dataclass(frozen=True)
-class Late(Fourier):
-    """A gait that begins a part of a cycle later."""
-
-    start: float = 0.0
-
-    def unit(self, t):
-        return super().unit(np.asarray(t) + 2 * np.pi * self.start)
-
-    def unit_rate(self, t):
-        return super().unit_rate(np.asarray(t) + 2 * np.pi * self.start)
-
-
-COS, SIN = np.random.default_rng(5).normal(size=(2, 2, 3))
-ODD = [1, 0, 1]
-
-
-@pytest.mark.parametrize(
-    ("cos", "sin", "shares"),
-    [
-        (COS, SIN, [1, 1, 1, 1]),
-        (COS * ODD, SIN * ODD, [1, 2, 1, 2]),
-        (COS[[0, 0]] * [[-1], [1]], SIN[[0, 0]], [1, 1, 2, 2]),
-        (COS[[0, 0]], SIN[[0, 0]] * [[1], [-1]], [1, 1, 1, 2]),
-        (COS[[0, 0]] * ODD, SIN[[0, 0]] * ODD * [[1], [-1]], [1, 2, 2, 4]),
-    ],
-    ids=["none", "mirrored", "backwards", "backwards in a mirror", "both"],
-)
-@pytest.mark.parametrize("start", [0.0, 0.1])
-def test_few_phases_tell_how_many_are_solved(cos, sin, shares, start):
-    """Of any number; images lie on phases of some of these only."""
-    gait = Late(cos=cos.tolist(), sin=sin.tolist(), start=start)
-    for traits, share in zip((NOTHING, MIRROR, BACKWARDS, BOTH), shares):
-        for phases in (*range(8, 25), 201, 1024):
-            solved = cycle_images(*gait.cycle(phases), traits).count
-            assert solved_count(gait, phases, traits) == solved
-            assert solved >= phases // share
 
 
 @pytest.mark.parametrize("part", [0, 1])

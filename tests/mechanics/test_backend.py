@@ -106,8 +106,8 @@ def test_starts(solved_by, medium):
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("rate", [1e-90, 1.0, 1e90])
-@pytest.mark.parametrize("size", [1e12, 1e31, 1e154, 1e155, 1e200, 1e300])
+@pytest.mark.parametrize("rate", [1e-90, 1e90])
+@pytest.mark.parametrize("size", [1e31, 1e154, 1e155, 1e300])
 @pytest.mark.parametrize("medium", ["glass-0.3mm-loose", "viscous-2"])
 def test_starts_whose_squares_overflow(rate, size, medium, solved_by):
     """So that drag reads as none: the answer is that of no start."""

@@ -53,18 +53,6 @@ def test_viscous_chain_agrees_with_sympy(link, ratio, rtol):
     assert (got.iterations == 1).all()
 
 
-@pytest.mark.parametrize("rule", ["midpoint", "gauss"])
-def test_quadrature_loads_approach_the_exact_ones(rule):
-    problem = GLASS, THREE, *samples(THREE, 60, seed=4)
-    exact, *others = (
-        body_velocity(*problem, regularisation=1e-3, loads=loads).checked().xi
-        for loads in ("exact", f"{rule}:10", f"{rule}:40", f"{rule}:160")
-    )
-    errors = np.sqrt(np.mean((np.array(others) - exact) ** 2, axis=(1, 2)))
-    assert errors[2] < 1e-3
-    assert (errors[1:] < errors[:-1] / 2).all()
-
-
 @pytest.mark.parametrize("medium", DRY)
 @pytest.mark.parametrize("c", [1e-12, 1e12])
 def test_dry_media_do_not_know_time(medium, c):
@@ -140,10 +128,10 @@ class Steps:
 
 
 def test_a_balance_that_is_not_solved_says_so():
-    found = body_velocity(Steps(), THREE, *samples(THREE, 3))
+    found = body_velocity(Steps(), THREE, *samples(THREE, 1))
     assert (found.status == "unconverged").all()
     assert (found.residual > 1e-10).all()
-    with pytest.raises(RuntimeError, match="3 of 3 force balances did not converge"):
+    with pytest.raises(RuntimeError, match="1 of 1 force balances did not converge"):
         found.checked()
 
 

@@ -152,21 +152,6 @@ def test_smoothing_is_least_squares(tmp_path):
     assert left == pytest.approx(0.5 * np.sqrt(9 / 4800), rel=0.4)
 
 
-def test_modes_of_points_are_those_of_curvature(tmp_path):
-    """Arcs of a circle: one mode is all there is."""
-    s, table = np.linspace(-0.5, 0.5, 30), []
-    for share in np.arange(40) / 40:
-        k = 0.3 + np.cos(2 * np.pi * share)
-        table += [(share, z.real, z.imag) for z in np.expm1(1j * k * s) / (1j * k)]
-    found = (
-        gait(write(tmp_path, "points", table), keep_modes=1, keep_harmonics=1).shape(T)
-        * ELEMENTS
-    )
-    np.testing.assert_allclose(
-        found, np.repeat(0.3 + np.cos(T)[:, None], ELEMENTS - 1, 1), atol=2e-5
-    )
-
-
 @pytest.mark.parametrize(
     "options",
     [{}, {"reverse": True}, {"keep_harmonics": 4, "keep_modes": 6, "reverse": True}],

@@ -1,7 +1,6 @@
 """Effects: what each one is, that it vanishes at its limit, that it commutes with
 others, what it takes away."""
 
-import dataclasses
 import functools
 
 import numpy as np
@@ -23,7 +22,7 @@ from rft import (
 )
 from rft.core.refusal import Refusal
 from rft.effects import EFFECTS as KINDS
-from rft.effects import batched_effect, engine
+from rft.effects import engine
 from rft.effects.contact import assemble
 from rft.formulas.link import quadratic_load
 
@@ -39,25 +38,6 @@ def march(*effects, phases=8, amplitude=1.0, body=UNEVEN, cycles=1, **options):
     """A few steps in loose glass."""
     shapes = OFF_CENTRE.cycle(phases, amplitude)
     return time_steps(GLASS, body, *shapes, effects=effects, cycles=cycles, **options)
-
-
-@pytest.mark.parametrize("name", KINDS_BY_NAME)
-def test_parameters_that_may_differ_within_a_batch(name):
-    """Those an effect names, each side by side, and no other."""
-    effect = EFFECTS[name][0](0.01)
-    given = {k: v for k, v in vars(effect).items() if v is not None}
-    for field, value in given.items():
-        is_list = isinstance(value, tuple)
-        changed = (*value[:-1], 2 * value[-1]) if is_list else 1.5 * value + 0.001
-        some = [effect, dataclasses.replace(effect, **{field: changed})]
-        if field in effect.batched:
-            joined = batched_effect(some, [2, 1])
-            assert getattr(joined, field).tolist() == [value, value, changed]
-            others = {k: v for k, v in vars(joined).items() if k != field}
-            assert others.items() <= vars(effect).items()
-        else:
-            with pytest.raises(ValueError, match=f"{field} cannot differ within a"):
-                batched_effect(some, [2, 1])
 
 
 @pytest.mark.parametrize("name", EFFECTS)

@@ -180,12 +180,6 @@ def test_a_medium_that_pushes_is_refused(name, solve):
         solve(medium, Chain(), *Circle().cycle(8), loads="gauss:4")
 
 
-def test_a_law_without_axial_drag():
-    """Sideways friction alone: residuals are then over the drag across."""
-    problem = Law((1.0, 0.0, 2.0)), Chain((1, 1.5, 0.8)), [0.9, 0.7], [1.0, -0.4]
-    assert body_velocity(*problem).checked().residual < 1e-9
-
-
 SURE, OPEN = (
     Granular(1.8, 0.24, 2.5),
     [[0.01, -2e-4, 3e-3], [-2e-4, 1e-4, 1e-5], [3e-3, 1e-5, 0.04]],

@@ -5,7 +5,7 @@ nothing else would say so."""
 import numpy as np
 import pytest
 from loads import as_array, element_load
-from registry import BODIES, DRY, EFFECTS, MEDIA
+from registry import BODIES, EFFECTS, MEDIA
 from test_balance import Mud
 from test_loads import CubicDrag
 
@@ -142,17 +142,3 @@ def test_mass(name):
     np.testing.assert_allclose(
         borne.sum(1), term(problem, xi)[:, 0], rtol=1e-12, atol=1e-13
     )
-
-
-def test_every_dry_law_is_homogeneous():
-    """eps dF/d(eps) = -(dF/dv) v: what the descent from one rounding to the next rests
-    on."""
-    rng = np.random.default_rng(5)
-    v, eps, h = rng.normal(size=(3, 2, 30)), np.full(30, 0.1), 1e-6
-    for name, medium in DRY.items():
-        load = element_load(medium)
-        change = (load(*v, eps + h)[:, 0] - load(*v, eps - h)[:, 0]) / (2 * h)
-        along = np.einsum("ijnb,jnb->inb", load(*v, eps)[:, 1:], v)
-        np.testing.assert_allclose(
-            eps * change, -along, atol=1e-6 * np.abs(along).max(), err_msg=name
-        )

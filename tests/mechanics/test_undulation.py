@@ -170,7 +170,7 @@ def test_endless_waves_slide_or_go_sideways(name, kinematics):
 
 @pytest.fixture(scope="module")
 def numbers():
-    return fig09c_efficiency.compute(np.linspace(0.05, 0.5, 16), finer=1)
+    return fig09c_efficiency.compute(np.linspace(0.05, 0.5, 13), finer=1)
 
 
 def test_fig09c_has_the_published_numbers(numbers):
@@ -259,13 +259,6 @@ def test_onset_and_offset_are_where_the_moment_changes_sign(scene):
             assert (np.sign(moment) == -sign * np.sign(step)).all()
 
 
-def test_lag_counts_from_the_zero_of_curvature():
-    """The sine's curvature falls through zero at t = - 2 pi waves s."""
-    found = undulation.activation(waving(1.5))
-    late = found["lag"] + found["onset"] + 2 * np.pi * 1.5 * found["s"]
-    np.testing.assert_allclose(np.exp(1j * late), 1.0, atol=2e-3)
-
-
 # 400 elements, 512 phases: waves: speed of activation over curvature by the lines, by
 # the first harmonic; lag at s = 0.25.
 ACTIVATION = {
@@ -308,16 +301,6 @@ def test_fig10(tmp_path):
     drawn(module, numbers, tmp_path)
 
 
-def test_extra_changes_of_sign_are_not_passed_off_as_onsets():
-    """Two waves on the body nearly leave its middle without a moment: it changes sign
-    six times there."""
-    found = undulation.activation(waving(2.0, 120, 128))
-    odd = found["changes"] != 2
-    assert 0 < odd.sum() < 10
-    assert (np.isnan(found["lag"]) == odd).all()
-    assert np.isnan(found["speed_ratio"])
-
-
 def test_the_wave_of_joint_angles_is_that_of_a_long_chain():
     """By sums over 10,000 body lengths, whole waves."""
     wave = Wave(amplitude=0.7, waves=1.3, joints=6)
@@ -326,13 +309,3 @@ def test_the_wave_of_joint_angles_is_that_of_a_long_chain():
     assert wave.wavelength() == pytest.approx(straight / 1.3, rel=1e-8)
     curvature = np.abs(alpha).mean() * 7 / 1.3
     assert wave.relative_curvature() == pytest.approx(curvature, rel=1e-3)
-
-
-def test_a_wave_of_joint_angles_performs_in_its_own_units():
-    wave, a = Wave(amplitude=0.7, waves=1.3, joints=6, frequency=2.0), [0.4, 0.7]
-    swimmer = Swimmer(Viscous(2.5), Chain((1,) * 7, length=0.4))
-    scene = Scene(swimmer, wave).with_numerics(phases=32)
-    found = undulation.performance(scene, a)
-    net = np.hypot(*scene.cycle(amplitudes=a).net.T[:2])
-    np.testing.assert_allclose(found["speed"], 2.0 * net)
-    np.testing.assert_allclose(found["efficiency"], net / 0.4 / wave.wavelength(a))
