@@ -153,12 +153,12 @@ def assert_believable(estimates, errors):
 
 
 def test_direct_estimates_cover_the_truth(truths):
-    """80 random scenes against 2048 phases at a regularisation of 1e-9: positions and
+    """50 random scenes against 2048 phases at a regularisation of 1e-9: positions and
     headings."""
     rng = np.random.default_rng(7)
     estimates = []
     errors = []
-    for _ in range(80):
+    for _ in range(50):
         some = random_scene(rng)
         loads = ("exact", "exact", "midpoint:20")[rng.integers(3)]
         regularisation = 10.0 ** rng.uniform(-6, -3)
@@ -178,7 +178,7 @@ def test_look_up_estimates_cover_the_truth(truths):
     tiers = [tier for tier in TIERS if tier != "direct"]
     estimates = []
     errors = []
-    for _ in range(12):
+    for _ in range(8):
         some = random_scene(rng)
         system = some.system
         a = some.gait.amplitude * np.linspace(0.3, 1.0, 4)
@@ -273,8 +273,7 @@ def test_settings_go_from_coarse_to_fine_without_a_repetition(tier):
 MANY = np.linspace(0.3, 2.0, 201)
 
 
-@pytest.mark.parametrize("every", [100, 2])
-@pytest.mark.parametrize("tol", [1e-2, 1e-3, 1e-5])
+@pytest.mark.parametrize(("tol", "every"), [(1e-2, 2), (1e-3, 2), (1e-5, 100)])
 def test_the_cheapest_tier_meets_the_tolerance(tol, every, truths):
     answer = tabled(cheapest_displacements(GLASS, MANY[::every], tol))
     tier = answer["tier"]

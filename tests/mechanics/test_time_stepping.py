@@ -149,11 +149,10 @@ def test_without_mass_the_joints_work_on_the_ground_alone_at_every_phase():
     np.testing.assert_allclose(by_joints, work.power, rtol=1e-6)
 
 
-@pytest.mark.parametrize(("medium", "phases"), [(GLASS, 48), (Viscous(2.0), 64)])
-def test_with_mass_the_joints_work_on_the_ground_in_the_mean(medium, phases):
-    alpha, alphadot = HEAVY.cycle(phases)
+def test_with_mass_the_joints_work_on_the_ground_in_the_mean():
+    alpha, alphadot = HEAVY.cycle(48)
     options = {"effects": (heavy(3.0),), "with_work": True}
-    work = time_steps(medium, UNEVEN, alpha, alphadot, **options).checked().work
+    work = time_steps(GLASS, UNEVEN, alpha, alphadot, **options).checked().work
     by_joints = (work.bending_moment * alphadot).sum(-1).mean()
     assert by_joints == pytest.approx(work.power.mean(), rel=1e-3)
 
@@ -328,8 +327,8 @@ def test_a_tolerance_refines_pieces():
 def test_cells_of_the_ground_do_not_keep_a_march_from_settling():
     """Displacements on disturbed ground come and go at random in the end."""
     effects = (DisturbedGround(radius=0.05, weakening=0.3),)
-    shapes = Sine(elements=20).cycle(32, [0.1, 0.2, 0.3])
-    found = time_steps(GLASS, Backbone(20), *shapes, effects=effects).checked()
+    shapes = Sine(elements=12).cycle(16, [0.1, 0.3])
+    found = time_steps(GLASS, Backbone(12), *shapes, effects=effects).checked()
     assert (found.status == "periodic").all()
 
 
@@ -371,8 +370,8 @@ def test_small_strokes_with_a_long_transient_reach_their_limit(case):
 
 def test_estimates_hold_what_is_left_of_the_way():
     system = Swimmer(Viscous(2.0), UNEVEN, (heavy(5.0),))
-    left = system.run(*HEAVY.cycle(64)).to_come
-    error = estimate.direct(Scene(system, HEAVY), HEAVY, np.array([1.0]), 64)[1]
+    left = system.run(*HEAVY.cycle(32)).to_come
+    error = estimate.direct(Scene(system, HEAVY), HEAVY, np.array([1.0]), 32)[1]
     assert (error >= left).all()
     assert left > 0
 
