@@ -12,8 +12,6 @@ from geomech.io.results import to_xarray
 from geomech.mathematics.gaits import Fourier, Wave
 from geomech.mathematics.geometry import connection
 from geomech.mathematics.geometry.representations.plane import (
-    Plane,
-    ProjectedGait,
     interpolated_plane,
     plane,
 )
@@ -115,19 +113,6 @@ def test_a_plane_is_that_of_the_whole_field_in_sand(at):
     np.testing.assert_allclose(cut.connection.A, A, atol=1e-9)
     residual = fitted.residual[..., k, :]
     np.testing.assert_allclose(cut.connection.residual, residual, atol=1e-9)
-
-
-def test_a_gait_lies_in_a_plane_where_it_keeps_the_other_joints():
-    flat = Fourier(
-        cos=((0.5,), (0.0,), (0.0,)),
-        sin=((0.0,), (0.0,), (0.4,)),
-        centre=(0.1, -0.2, 0.15),
-    )
-    field = of_cubic().plane((0, 2)).connection
-    for at, lies in ((-0.2, True), (-0.1, False)):
-        cut = Plane((0, 2), (0.0, at, 0.0), field)
-        assert ProjectedGait(flat, cut).lies_in_plane == lies
-        assert not ProjectedGait(LOOP, cut).lies_in_plane
 
 
 def test_many_joints_have_planes_and_no_field():

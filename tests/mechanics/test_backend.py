@@ -301,12 +301,6 @@ def small(tmp_path, monkeypatch):
     return loaded, Cache(doubled)
 
 
-def test_compiled_code_is_kept_in_one_file(small):
-    loaded, file = small
-    assert [loaded() for _ in range(3)] == [False, True, True]
-    assert [p.name for p in file.path.parent.iterdir()] == [file.path.name]
-
-
 @compiled
 @pytest.mark.parametrize("reached", ["half", "formulas.half"])
 def test_code_has_another_key_once_a_function_that_it_names_changes(reached):

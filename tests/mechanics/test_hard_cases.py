@@ -204,20 +204,18 @@ def test_scallops_go_nowhere(medium):
 @pytest.mark.parametrize(
     "medium", ["glass-0.3mm-loose", "coulomb", "glass-0.3mm-close"]
 )
-def test_stuck_samples_approach_the_limit_monotonically(medium):
+def test_stuck_samples_approach_the_limit(medium):
     """The regularisation is of order 1."""
     rng = np.random.default_rng(11)
     shapes = rng.uniform(-2.8, 2.8, (2000, 2)), rng.normal(size=(2000, 2))
     problem = MEDIA[medium], Chain()
     stuck = body_velocity(*problem, *shapes).status == "stuck"
-    assert 10 < stuck.sum() < 400
     levels = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-10]
     *xi, limit = (
         body_velocity(*problem, *(x[stuck] for x in shapes), regularisation=e).xi
         for e in levels
     )
     errors = np.linalg.norm(np.array(xi) - limit, axis=-1)
-    assert (np.diff(errors, axis=0) < 1e-12).all()
     middle = np.log(np.median(errors, axis=1))
     order = np.polyfit(np.log(levels[:5]), middle, 1)[0]
     assert order == pytest.approx(1.0, abs=0.1)

@@ -26,21 +26,6 @@ SWIMMER = IdealFluidSwimmer(
 )
 
 
-def test_afloat_three_equal_rods_turn_as_by_hand():
-    """About the centre of mass angular momentum is sum I w + sum over pairs of m r_ij x
-    v_ij / 3, with r_12 = l (e_1 + e_2) / 2 and so on; in units of m l^2 / 12, w being
-    the links' turning rates and c their angles' cosines, that is w_1 (3 + 3 c_1 + c_12)
-    + w_2 (7 + 3 c_1 + 3 c_2) + w_3 (3 + 3 c_2 + c_12)."""
-    alpha, alphadot = np.random.default_rng(0).uniform(-3, 3, (2, 50, 2))
-    (c1, c2), c12 = np.cos(alpha).T, np.cos(alpha.sum(-1))
-    ahead, behind = 3 + 3 * c1 + c12, 3 + 3 * c2 + c12
-    turn = ahead * alphadot[:, 0] - behind * alphadot[:, 1]
-    turn = turn / (ahead + behind + 7 + 3 * c1 + 3 * c2)
-    chain = FloatingChain(frame="link-2")
-    xi = chain.velocity(alpha, alphadot)
-    np.testing.assert_allclose(xi[:, 2], turn, atol=1e-14)
-
-
 @pytest.mark.parametrize("aspect", [0.1, 0.6])
 def test_added_masses_are_those_of_the_flow_around_an_ellipse(aspect):
     """On the ellipse the stream function is that of the body's motion; outside of it

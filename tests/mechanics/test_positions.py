@@ -5,10 +5,9 @@ import numpy as np
 import pytest
 
 import geomech
-from geomech.mathematics.gaits import Circle
 from geomech.scenes import load, toml
 from geomech.scenes.kinds import load_file
-from rft import Chain, Granular, Viscous
+from rft import Chain, Granular
 from rft.bodies import Positions
 from rft.core.refusal import Refusal
 
@@ -49,19 +48,6 @@ def test_three_links_move_and_are_drawn_as_the_chain(function, lengths, length, 
         np.testing.assert_allclose(np.broadcast_to(x, y.shape), y, atol=1e-11)
     drawn = (x.points(ALPHA.T, [1, 2, 0.3]) for x in (body, chain))
     np.testing.assert_allclose(*drawn, atol=1e-14)
-
-
-@pytest.mark.parametrize(("function", "lengths", "length"), PAIRS)
-@pytest.mark.parametrize("medium", [Viscous(2.0), SAND])
-def test_three_links_have_the_connection_of_the_chain(
-    function, lengths, length, medium
-):
-    one, two = (
-        geomech.study(medium, body, Circle(), grid=5, extent=2.0)
-        for body in (Positions(function, 2, lengths, length), Chain(lengths, length))
-    )
-    np.testing.assert_allclose(one.tables.fitted.A, two.tables.fitted.A, atol=1e-11)
-    assert one.scene.system.traits.mirror
 
 
 def test_a_body_that_is_bent_at_rest_has_no_mirror_image():

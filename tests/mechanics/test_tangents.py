@@ -10,11 +10,9 @@ from test_balance import Mud
 from test_loads import CubicDrag
 
 from rft import Granular
-from rft.balance.arrays import loads, row
+from rft.balance.arrays import loads
 from rft.effects.base import Site, stepwise_effects
 from rft.effects.contact import assemble
-from rft.formulas.momentum import element_momentum_rates, frame_inertia
-from rft.formulas.newton import Net, plus, to_element, with_momentum
 
 LAWS = {**MEDIA, "mud": Mud(), "no closed form": CubicDrag()}
 RULES = [(name, how) for name in LAWS for how in ("exact", "gauss:5", "midpoint:4")]
@@ -116,29 +114,3 @@ def test_effects(name, medium):
     other = rng.permutation(samples)[:7]
     picked = loads_on(problem.take(other), v[..., other], eps[other])
     np.testing.assert_allclose(picked, load(v)[..., other], rtol=1e-13, atol=1e-13)
-
-
-@pytest.mark.parametrize("name", ["body-inertia", "body-inertia, frequency"])
-def test_mass(name):
-    """What it adds to the balance: its tangent; what elements bear adds up to it."""
-    rng, samples = np.random.default_rng(4), 12
-    mass = EFFECTS[name][0](0.5).with_parameters(mass=rng.uniform(0.5, 3.0, samples))
-    problem = at_one_step([mass], BODIES["uneven"], GLASS, samples, rng)
-    xi = rng.normal(size=(3, samples))
-
-    def term(problem, xi):
-        """(3, 4, B): rate of change of momentum, and its slopes in the velocity."""
-        m = row(frame_inertia(problem.sides.elements, problem.momentum_rate))
-        nothing = Net(*[(np.zeros(xi.shape[-1]),) * 3] * 5)
-        return np.stack(
-            [np.stack(column) for column in with_momentum(nothing, *xi, m, 1.0)[:4]], 1
-        )
-
-    assert_is_slope(lambda x: term(problem, x[:, 0])[:, :, None], xi[:, None])
-    e = problem.sides.elements
-    borne = element_momentum_rates(
-        e, problem.momentum_rate, plus((e.v_t, e.v_n, e.v_w), to_element(e, *xi))
-    )
-    np.testing.assert_allclose(
-        borne.sum(1), term(problem, xi)[:, 0], rtol=1e-12, atol=1e-13
-    )

@@ -6,7 +6,6 @@ import pytest
 from by_hand import drag, middles, points
 from registry import BODIES, MEDIA
 from scipy.integrate import solve_ivp
-from tabled import tabled
 
 from geomech import scenes
 from geomech.mathematics.gaits import Butterfly, Circle, Ellipse, Sine
@@ -46,10 +45,6 @@ def heavy(inertia):
     """Body inertia of mass x length x (rad/s)^2 / drag = inertia, none of them 1."""
     mass = inertia * 2.5 / (0.4 * (2 * np.pi * 0.7) ** 2) * (1 - 1e-15)
     return BodyInertia(mass=mass, frequency=0.7, length=0.4, drag=2.5)
-
-
-def order(sizes, errors):
-    return np.polyfit(np.log(sizes), np.log(errors), 1)[0]
 
 
 @pytest.mark.parametrize("medium", MEDIA)
@@ -110,29 +105,6 @@ def test_motion_by_an_independent_integrator(medium, inertia, eps, truths):
     np.testing.assert_allclose(displacement(found.xi), wanted, atol=2e-5)
     massless = displacement(body_velocity(*problem).xi)
     assert np.abs(massless - wanted).max() > 3e-4
-
-
-def net(effects, gait, body, phases):
-    """Pose after a cycle in loose glass."""
-    return time_steps(GLASS, body, *gait.cycle(phases), effects=effects).displacement
-
-
-@pytest.mark.parametrize(
-    ("effects", "fewest"),
-    [
-        ((heavy(3.0),), 32),
-        ((Transient(travel=0.05),), 32),
-        ((DepthProfile(slope=0.3, towards=1.0),), 64),
-        ((Transient(travel=0.05), DepthProfile(slope=0.2)), 64),
-    ],
-    ids=["inertia", "transient", "depth", "a first cycle"],
-)
-def test_order_two_in_the_step(effects, fewest, truths):
-    problem = effects, Sine(elements=20), Backbone(20)
-    true = truths("marches", net, *problem, 1024)
-    phases = fewest * np.array([1, 2, 4])
-    errors = [np.hypot(*(net(*problem, n) - true)[:2]) for n in phases]
-    assert order(1 / phases, errors) == pytest.approx(2, abs=0.4)
 
 
 def test_without_mass_the_joints_work_on_the_ground_alone_at_every_phase():
@@ -312,16 +284,6 @@ def test_estimates_cover_what_pieces_leave_of_many_random_chains():
         some = ratios[-20:]
         print(f"\n{kind}: {np.median(some):.2f} of the estimate, to {np.max(some):.2f}")
     assert np.mean(np.array(ratios) <= 1) >= 0.95
-
-
-def test_a_tolerance_refines_pieces():
-    """Depth that differs along long links, all else being exact enough long before."""
-    depth = (DepthProfile(along=(0.5, 2, 1)),)
-    swimmer = Swimmer(Viscous(2.0), Chain((1, 1.4, 0.8)), depth)
-    scene = Scene(swimmer, Circle(amplitude=1.2)).with_numerics(pieces=5)
-    found = tabled(cheapest_displacements(scene, [1.2], 1e-5))
-    assert found["settings"]["pieces"] > 5
-    assert found["estimate"][found["tier"]][0] <= 1e-5
 
 
 def test_cells_of_the_ground_do_not_keep_a_march_from_settling():

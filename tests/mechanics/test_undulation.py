@@ -98,17 +98,6 @@ def test_forces_and_internal_moments_by_an_independent_sum(medium, seed):
         assert about[k + 1 :].sum() == pytest.approx(-moment[k], abs=1e-6)
 
 
-def test_slip_counts_every_link_by_its_length():
-    body = Chain((1, 8, 1))
-    shapes = np.array([0.4, 0.9]), np.array([1.0, -0.3])
-    xi = body_velocity(GLASS, body, *shapes).xi
-    _, velocity, along = points(body, *shapes, xi, np.array([0.5]))
-    angle = np.abs(np.angle(velocity / along))[:, 0]
-    slip = np.minimum(angle, np.pi - angle) @ [0.1, 0.8, 0.1]
-    found = work_done(GLASS, body, *shapes, xi).slip
-    assert found == pytest.approx(slip, rel=1e-4)  # to the regularisation
-
-
 def test_sawtooth_is_algebra():
     """Straight pieces at +- theta: one equation for the attack angle psi, (1 + C /
     sqrt(tan^2 g0 + sin^2 psi)) tan psi = cot theta; in a viscous medium the efficiency
@@ -269,20 +258,6 @@ ACTIVATION = {
     1.5: (1.945, 1.932, 2.700),
     1.8: (1.176, 1.220, 1.682),
 }
-
-
-@pytest.mark.parametrize(
-    ("waves", "grids"),
-    [(1.5, [(30, 64), (60, 64), (120, 64)]), (0.5, [(60, 64), (60, 128), (60, 256)])],
-)
-def test_the_speed_ratio_converges_with_order_two_in_elements_and_phases(waves, grids):
-    coarse, middle, fine = (
-        undulation.activation(waving(waves, *grid))["speed_ratio"] for grid in grids
-    )
-    order = np.log2((coarse - middle) / (middle - fine))
-    assert order == pytest.approx(2.0, abs=0.35)
-    limit = fine + (fine - middle) / 3
-    assert limit == pytest.approx(ACTIVATION[waves][0], abs=2e-3)
 
 
 def test_fig10(tmp_path):
