@@ -137,7 +137,6 @@ def test_bad_gaits_are_refused(make, said):
     ],
 )
 def test_a_loop_encloses_its_area(gait, amplitudes, area):
-    """Of a polygon to the error, which its corners leave."""
     for phases in (32, 63):
         found, error = loop_area(gait, phases, amplitudes)
         assert (np.abs(found - area) <= error + 1e-15).all()

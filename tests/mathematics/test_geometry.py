@@ -120,7 +120,6 @@ def test_area_counts_winding_numbers(gait, winding):
     "mean", [Chain((1, 2, 1), length=0.4), Serpenoid(elements=9, length=0.4, waves=0.8)]
 )
 def test_changing_frame_is_solving_in_that_frame(medium, mean, frame):
-    """Links' headings and rates, through the modes of a backbone too."""
     rng = np.random.default_rng(2)
     alpha = rng.uniform(-2, 2, (30, 2))
     alphadot = rng.normal(size=(30, 2))
@@ -181,7 +180,6 @@ def test_bad_shapes_are_refused(make, said):
 
 @pytest.mark.parametrize("count", [8, 16])
 def test_a_connection_knows_the_error_of_its_directions(count):
-    """Against 64 directions, as rms of each row."""
     velocity = load("three-link-glass").system.velocity
     axes = connection.grid(2, 7)
     few, many = (connection.fit(velocity, axes, n) for n in (count, 64))

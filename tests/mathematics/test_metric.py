@@ -159,7 +159,6 @@ def pulled_back(alpha, rate):
 
 
 def test_a_flat_metric_in_disguise_is_flattened():
-    """By order 2."""
     off = []
     for points in (11, 21):
         found = stretch(metric.fit(pulled_back, connection.grid(2, points, 1.5)))

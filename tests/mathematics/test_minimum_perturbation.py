@@ -69,7 +69,6 @@ def test_it_is_the_same_frame_wherever_one_starts(body):
 @pytest.mark.parametrize(("moved", "rows"), [(0, (0, 1)), (1, (0, 1)), (2, (2,))])
 @pytest.mark.parametrize("seed", range(2))
 def test_no_frame_nearby_has_a_smaller_connection(moved, rows, seed):
-    """Moved along x or y, or turned, by a wave."""
     first = fitted(Chain((0.7, 1.4, 0.9)))
     frame = minimum_perturbation(first)
     c = dataclasses.replace(first, A=frame.connection(first))
@@ -97,7 +96,6 @@ LAWS = {"viscous": "ratio = 2.0", "granular": "C = 1.8\ngamma0 = 0.24"}
 
 @pytest.mark.parametrize("law", LAWS)
 def test_a_scene_in_it(law):
-    """All tiers agree with the frame of the body by carrying over."""
     scene = scenes.parse(SCENE.format(law=law, numbers=LAWS[law]))
     study = SceneTables(scene)
     plain = SceneTables(scene.changed(system=scene.system.inner))

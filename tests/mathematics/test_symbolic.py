@@ -38,7 +38,6 @@ EXACT = {
     ],
 )
 def test_formulas_give_the_numbers(name, in_lowest_terms):
-    """To rounding."""
     system = EXACT[name]
     A, alpha = formula(system)
     if in_lowest_terms:
@@ -70,7 +69,6 @@ def test_the_snake_is_as_by_hand():
 
 @pytest.mark.parametrize("ratio", [1.5, 4.0])
 def test_symbols_stay(ratio):
-    """A viscous chain of any ratio: as the numbers of one are."""
     r = sp.Symbol("r", positive=True)
     A, (a,) = connections.viscous_chain((1, 2), r, "link-1")
     short = symbolic.simplified(A, (a,))

@@ -35,7 +35,6 @@ REVERSIBLE = {"three", "three-middle", "five", "backbone"}
 
 @pytest.mark.parametrize("name", BODIES)
 def test_which_bodies_are_reversible(name):
-    """Not with a link longer at one end, a frame at one end, modes that are not."""
     assert is_reversible(BODIES[name]) == (name in REVERSIBLE)
 
 
@@ -176,7 +175,6 @@ BACK = Circle(amplitude=0.7, reverse=True)
     ],
 )
 def test_gaits_are_those_of_all_phases(body, effects, gait, amplitudes, phases, count):
-    """Though only some of their phases are solved."""
     swimmer = Swimmer(GLASS, body, effects)
     alpha, alphadot = gait.cycle(phases, amplitudes)
     assert cycle_images(alpha, alphadot, swimmer.traits).count == count

@@ -53,7 +53,6 @@ def test_the_snake_moves_as_its_closed_form(length):
 
 @pytest.mark.parametrize("frame", ["mean", "link-1", "link-3"])
 def test_no_wheel_slips_in_any_frame(frame):
-    """Of uneven links."""
     lengths = (0.8, 1.3, 1.0)
     alpha, alphadot = np.random.default_rng(1).normal(size=(2, 50, 2))
     xi = NoSlipSnake(lengths, 0.4, frame).velocity(alpha, alphadot)
@@ -148,7 +147,6 @@ def test_what_has_singular_shapes_is_not_summed_nor_looked_up(ask, said):
 
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_what_a_system_says_of_itself_holds(name):
-    """Mirror, linearity, rate-independence, frame, unit and kind."""
     system = SYSTEMS[name]
     rng = np.random.default_rng(2)
     alpha, alphadot = rng.uniform(-1.2, 1.2, (2, 30, system.joints))

@@ -75,7 +75,6 @@ def test_adapted_area_predicts_its_family(truth):
 @pytest.mark.parametrize("name", GAITS)
 @pytest.mark.parametrize("medium", ["viscous-2", "glass-0.3mm-loose"])
 def test_families_of_every_gait(name, medium):
-    """Exact up to the table, whether or not the body turns on the whole."""
     swimmer = Swimmer(MEDIA[medium], Chain())
     study = SceneTables(Scene(swimmer, GAITS[name], Numerics(curves=48)))
     adapted, direct = (study.poses(m, None, [0.3, 0.6]) for m in ("adapted", "direct"))

@@ -262,7 +262,6 @@ class Turtle:
     ids=len,
 )
 def test_what_somebody_else_writes_runs_by_both(effects):
-    """A law, an effect with a past and a body: the same digits."""
     problem = Quartic(), Turtle(), *GAIT.cycle(16, np.array([0.4, 0.9]))
     options = {"effects": sized(effects, Turtle()), "cycles": 2, "with_work": True}
     plain, fast = (time_steps(*problem, **options, backend=b) for b in BOTH)
@@ -304,8 +303,6 @@ def small(tmp_path, monkeypatch):
 @compiled
 @pytest.mark.parametrize("reached", ["half", "formulas.half"])
 def test_code_has_another_key_once_a_function_that_it_names_changes(reached):
-    """By its own name, and as that of a module; what the module has besides does not
-    count."""
     from rft.balance.cache import digest
 
     def key(share, unused=1.0):

@@ -74,7 +74,6 @@ def test_exact_drag_gives_its_law_back(C, gamma0_deg):
     ],
 )
 def test_other_laws(law, medium, names, values):
-    """In a fluid there is no weight of grains."""
     found = fit(law, rod_drag(PSI, *exact(medium)), ROD)
     assert found.names == names
     np.testing.assert_allclose(found.values, values, rtol=1e-9)

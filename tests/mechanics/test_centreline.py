@@ -64,7 +64,6 @@ def rows(kind, count=32, places=40, amplitude=0.1, noise=0.0, phases=None, seed=
 
 
 def write(folder, kind, table=None, name="swim.csv", **sizes):
-    """A CSV file, and its path."""
     lines = [
         ",".join(f"{x:.17g}" for x in row)
         for row in (rows(kind, **sizes) if table is None else table)
@@ -99,7 +98,6 @@ def test_order_in_frames(tmp_path):
 
 @pytest.mark.parametrize("kind", ["curvature", "points"])
 def test_order_along_the_body(kind, tmp_path):
-    """4 in the middle of the body."""
     middle = []
     for n in (28, 112):
         path = write(tmp_path, kind, count=112, places=n + 1, amplitude=0.05)
@@ -157,7 +155,6 @@ def test_smoothing_is_least_squares(tmp_path):
     [{}, {"reverse": True}, {"keep_harmonics": 4, "keep_modes": 6, "reverse": True}],
 )
 def test_it_is_a_gait(options, tmp_path):
-    """Closed, with rates that are derivatives, and backwards in reverse."""
     path = write(tmp_path, "points", amplitude=0.2)
     made = gait(path, amplitude=0.7, **options)
     slope = (made.shape(T + 1e-5) - made.shape(T - 1e-5)) / 2e-5
@@ -360,7 +357,6 @@ def test_bad_files_are_refused(name, tmp_path):
 
 @pytest.mark.parametrize("noise", [0.0, 0.5])
 def test_a_wave_to_the_head_is_noted(noise, tmp_path):
-    """Unless it is asked for."""
     table = list(rows("curvature", count=16, amplitude=0.2, noise=noise))
     gait(write(tmp_path, "curvature", table))  # warnings are errors here
     table = [(t, 1 - s, -value) for t, s, value in table]

@@ -35,7 +35,6 @@ UNEVEN = Chain((1, 1.4, 0.8))
 
 
 def straight(effects, body=None):
-    """The balance of a straight body."""
     body = body or Chain((1, 1))
     assembly = assemble(GLASS, body, effects, pieces=40)
     return assembly.problem(np.zeros((body.joints, 1)), np.ones((body.joints, 1)))

@@ -35,7 +35,6 @@ KINDS_BY_NAME = [name for name in EFFECTS if "," not in name]
 
 
 def march(*effects, phases=8, amplitude=1.0, body=UNEVEN, cycles=1, **options):
-    """A few steps in loose glass."""
     shapes = OFF_CENTRE.cycle(phases, amplitude)
     return time_steps(GLASS, body, *shapes, effects=effects, cycles=cycles, **options)
 
@@ -59,7 +58,6 @@ def test_effects_are_the_same_on_a_body_of_any_size(name):
 def test_lengths_are_in_metres_on_a_body_with_a_length_and_in_body_lengths_without(
     name,
 ):
-    """Neither is taken for the other in silence."""
     effect = EFFECTS["depth-profile, slope" if "depth" in name else name][0](0.3)
     field = next(iter(KINDS[name].metres))
     in_metres = effect.in_metres(0.4)
@@ -138,7 +136,6 @@ def test_any_two_effects_commute(name):
 
 @pytest.mark.parametrize("name", ONE_OF_EACH)
 def test_every_sample_of_a_batch_has_its_own_parameters(name):
-    """Those that may differ, all at once, against every sample alone."""
     effect = ONE_OF_EACH[name]
     options = {"regularisation": 1e-3, "tolerance": 1e-13, "pieces": 10}
     parts, amplitudes = np.array([1.0, 0.6, 0.8]), np.array([0.7, 1.0, 1.2])

@@ -205,7 +205,6 @@ def test_scallops_go_nowhere(medium):
     "medium", ["glass-0.3mm-loose", "coulomb", "glass-0.3mm-close"]
 )
 def test_stuck_samples_approach_the_limit(medium):
-    """The regularisation is of order 1."""
     rng = np.random.default_rng(11)
     shapes = rng.uniform(-2.8, 2.8, (2000, 2)), rng.normal(size=(2000, 2))
     problem = MEDIA[medium], Chain()

@@ -110,7 +110,6 @@ def test_momentum_is_conserved_in_the_world(system, frame):
 
 @pytest.mark.parametrize("system", [AFLOAT, SWIMMER], ids=lambda s: s.kind)
 def test_cost_is_a_metric(system):
-    """The same in every frame; and `metric.fit` takes it."""
     alpha, alphadot = np.random.default_rng(4).uniform(-2.5, 2.5, (2, 20, 2))
     cost = system.squared_speed(alpha, alphadot)
     other = in_frame(system, "link-2").squared_speed(alpha, alphadot)

@@ -51,7 +51,6 @@ def test_three_links_move_and_are_drawn_as_the_chain(function, lengths, length, 
 
 
 def test_a_body_that_is_bent_at_rest_has_no_mirror_image():
-    """A chain with all shapes shifted."""
     shift = np.array([0.4, 0.1])
     bent = Positions(lambda alpha: hinged(alpha + shift), 2, (1, 1, 1))
     swimmer = geomech.Swimmer(SAND, bent)

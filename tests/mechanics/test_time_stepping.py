@@ -174,8 +174,6 @@ HARD_GAITS = {
 @pytest.mark.parametrize("case", HARD)
 @pytest.mark.parametrize("medium", ["glass-0.3mm-loose", "sharp", "strong"])
 def test_hard_marches_converge(case, medium):
-    """Links that stick, joints that pause, straight bodies and kinks, phase after
-    phase."""
     alpha = np.moveaxis(list(HARD_GAITS.values()), 1, -1)
     alphadot = (np.roll(alpha, -1, 1) - np.roll(alpha, 1, 1)) / (2 * T[1])
     problem = MEDIA[medium], Chain(), alpha, alphadot
@@ -208,7 +206,6 @@ def periodic(effects, gait, body, phases, amplitudes):
     "effect", [Transient(travel=0.05), heavy(2.0), DepthProfile(slope=0.2)], ids=repr
 )
 def test_estimates_of_marches_cover_the_truth(effect, truths):
-    """Against four times the phases, with the same elements."""
     parts = {"body": Backbone(30), "effects": (effect,), "gait": Sine(elements=30)}
     scene = SANDFISH.changed(**parts)
     a = np.array([0.12, 0.22, 0.35])
@@ -244,7 +241,6 @@ def pieced_scene(rng, kind):
 
 
 def second_cycle(medium, body, gait, effects, pieces, phases, amplitudes):
-    """Poses after the second cycle."""
     scene = Scene(Swimmer(medium, body, effects), gait)
     scene = scene.with_numerics(pieces=pieces, phases=phases, tolerance=1e-9, cycles=2)
     return SceneTables(scene).poses("direct", None, amplitudes)
@@ -287,7 +283,6 @@ def test_estimates_cover_what_pieces_leave_of_many_random_chains():
 
 
 def test_cells_of_the_ground_do_not_keep_a_march_from_settling():
-    """Displacements on disturbed ground come and go at random in the end."""
     effects = (DisturbedGround(radius=0.05, weakening=0.3),)
     shapes = Sine(elements=12).cycle(16, [0.1, 0.3])
     found = time_steps(GLASS, Backbone(12), *shapes, effects=effects).checked()

@@ -189,7 +189,6 @@ CHEAPEST = {
 
 @pytest.mark.parametrize("name", CHEAPEST)
 def test_cost_and_slip(numbers, name):
-    """The scenes' own elements are within 1.5 % of three times as many."""
     best, cost, slip = CHEAPEST[name]
     found = numbers[name]
     place, least = found["best"]["cost_of_transport"]
@@ -277,7 +276,6 @@ def test_fig10(tmp_path):
 
 
 def test_the_wave_of_joint_angles_is_that_of_a_long_chain():
-    """By sums over 10,000 body lengths, whole waves."""
     wave = Wave(amplitude=0.7, waves=1.3, joints=6)
     alpha = 0.7 * np.cos(0.4 + 2 * np.pi * 1.3 * np.arange(70_000) / 7)
     straight = np.abs(np.exp(1j * np.cumsum(alpha)).mean())
