@@ -90,6 +90,9 @@ def test_singular_shapes_are_left_out_of_fields(lengths):
     assert (masked[:, 1:] & masked[:, :-1])[d[:, 1:] * d[:, :-1] < 0].all()
     exact = np.stack([system.velocity(shapes, e) for e in np.eye(2)], -1)
     np.testing.assert_allclose(A[~masked], exact[~masked], rtol=1e-9, atol=1e-11)
+    unknown = np.isnan(study.curvature.values[0])
+    assert (unknown >= masked).all()
+    assert unknown.sum() <= masked.sum() + 10
 
 
 def test_the_ccf_of_the_snake_away_from_singular_shapes_is_that_of_its_formula():
