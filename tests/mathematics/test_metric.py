@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from scipy.linalg import sqrtm
 
+from geomech import plots
 from geomech.mathematics.gaits import Circle, Ellipse
 from geomech.mathematics.geometry import connection, metric
 from geomech.mathematics.geometry.representations.field import Field
@@ -192,3 +193,22 @@ def test_cells_that_are_turned_over_are_counted_by_triangles(x, y, share):
     """Of a plane that is folded along the middle of its third column of four, the last
     column is turned over."""
     assert inverted_fraction(np.stack([x, y], -1)) == share
+
+
+def test_indicatrix_has_unit_cost(viscous):
+    where = np.array([[0.3, -0.8], [1.2, 1.0]])
+    for table in (viscous, metric.fit_norm(power(SAND), connection.grid(2, 9, 2.0))):
+        rates = table.indicatrix(where, 36)
+        assert table.norm(where[:, None] + 0 * rates, rates) == pytest.approx(1)
+
+
+@pytest.mark.parametrize(("reverse", "word"), [(False, "backwards"), (True, "ahead")])
+def test_the_area_is_shaded_by_what_it_adds(reverse, word):
+    """CCF_x = -1: a counter-clockwise circle goes backwards, a clockwise one ahead."""
+    axes = connection.grid(2, 15, 1.5)
+    values = np.zeros((3, 15, 15))
+    values[0] = -1.0
+    gait = Circle(amplitude=0.8, reverse=reverse)
+    ax = plots.figure(3, 3)[1][0, 0]
+    drawn = plots.ccf_contours(Field(axes, values), 0, [gait], ax=ax)
+    assert [text.get_text() for text in drawn.get_legend().get_texts()] == [word]

@@ -21,6 +21,7 @@ from geomech.studies.maps import fields
 from geomech.studies.scene_tables import SceneTables
 from rft import Chain, Viscous
 from rft.bodies.base import body_size
+from rft.core.refusal import Refusal
 from rft.formulas import se2
 
 pytestmark = pytest.mark.usefixtures("fastest")
@@ -123,3 +124,10 @@ def test_its_file_has_the_pose_of_the_frame(tmp_path):
         pose = file.variables["frame_pose"]
         assert np.array(pose[:]) == pytest.approx(scene.system.field.field.values)
         assert pose.units == b"m, m, rad"
+
+
+def test_frames_that_contradict_each_other_are_refused():
+    text = SCENE.format(law="viscous", numbers=LAWS["viscous"])
+    text = text.replace("minimum-perturbation", "link-2")
+    with pytest.raises(Refusal, match="but the scene's frame = 'link-2'"):
+        scenes.parse(text.replace('"chain"', '"chain"\nframe = "minimum-perturbation"'))

@@ -5,6 +5,8 @@ import dataclasses
 
 import numpy as np
 import pytest
+from commands import geomech
+from registry import DATA
 from tabled import tabled
 
 from geomech import Numerics, Scene
@@ -18,6 +20,7 @@ from geomech.mathematics.geometry.representations.plane import (
 from geomech.mathematics.geometry.traits import Traits
 from geomech.mathematics.systems import Swimmer
 from geomech.mathematics.tiers.fitted import finest_grid, is_too_large
+from geomech.questions.swimmers.run import Run
 from geomech.studies.maps import fields
 from geomech.studies.maps.shape_space import plane_origin
 from geomech.studies.scene_tables import SceneTables
@@ -250,3 +253,16 @@ def test_a_file_of_three_joints_has_all_pairs():
     assert data["pair_joints"].values.tolist() == [[1, 2], [1, 3], [2, 3]]
     second = study.two_form.pair(0, 2).values
     np.testing.assert_array_equal(data["ccf_pairs"][1], second)
+
+
+def test_pictures_tell_the_angle_of_a_slice(tmp_path):
+    scene = DATA / "frozen" / "four.toml"
+    options = ("--pair", "3,1", "--slice", "20deg", "--plot", "a.svg")
+    code, _, err = geomech("ccf", str(scene), *options, cwd=tmp_path)
+    assert (code, err) == (0, "")
+    assert "0.349 rad" in (tmp_path / "a.svg").read_text()
+
+
+def test_a_run_of_three_joints_has_its_field_and_tiers():
+    scene = Scene(Swimmer(Viscous(2.3), FOUR_LINKS), LOOP, Numerics(grid=5, extent=1.2))
+    assert {"area", "path", "direct"} <= {*Run(scene).ask()["tier"].values}

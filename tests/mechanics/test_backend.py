@@ -10,6 +10,7 @@ import os
 import pathlib
 import re
 import resource
+import runpy
 import shlex
 import subprocess
 import sys
@@ -40,6 +41,7 @@ from rft.balance import solver as balance
 from rft.balance.backend import Note
 from rft.bodies import Elements
 from rft.core.premise import Premise
+from rft.core.refusal import Refusal
 from rft.effects import Effect
 from rft.effects.contact import assemble
 from rft.formulas.newton import Limits
@@ -429,3 +431,44 @@ def test_what_the_page_says_that_formulas_take_is_what_compiles():
     scope |= {"x": rows[0], "y": rows[1], "a": 0.5}
     expected = [np.broadcast_to(eval(text, scope), 8) for text in texts]
     np.testing.assert_allclose(out, expected, rtol=1e-14)
+
+
+@pytest.mark.timeout(900)  # the oldest numba compiles for minutes
+@compiled
+def test_code_is_compiled_beforehand(capsys):
+    from rft.balance.compiled import kernel
+
+    runpy.run_module("rft", run_name="__main__")
+    assert capsys.readouterr().out.startswith("compiled code is kept in ")
+    kernel.cache_clear()
+    body_velocity(GLASS, BODY, (0.4, -0.7), (1.0, 0.3), backend="numba")
+    assert sum(kernel(type(record(GLASS))).stats.cache_misses.values()) == 0
+
+
+@dataclasses.dataclass(frozen=True)
+class Slip:
+    """A law whose formula has a power, which does not compile."""
+
+    @formula
+    def traction(self, v_t, v_n, rounding=0.0):
+        speed = sqrt(v_t * v_t + v_n * v_n + rounding * rounding)
+        return v_t / speed, (v_n / speed) ** 3
+
+
+@compiled
+def test_a_slip_in_a_formula_is_told_by_function_and_line():
+    import numba
+
+    from rft.balance.cache import cached
+    from rft.formulas import simd
+
+    traction, load, store = Slip.traction, simd.load, simd.store
+
+    def run(rows):
+        store(rows, 0, traction(None, load(rows, 0), load(rows, 1))[1])
+
+    simd.register_formulas()
+    line = traction.__code__.co_firstlineno + 3
+    said = rf"Slip.traction \(.*, line {line}\).*\*\* 3"
+    with pytest.raises(Refusal, match=said):
+        cached(numba.njit(run), "a test")(np.ones((2, 8)))

@@ -447,3 +447,15 @@ def test_no_sample_has_several_solutions():
         np.testing.assert_allclose(found, 0 * found + taken, atol=1e-5)
     print(f"\n{len(samples)} samples, one solution each; no start led to {missed}")
     assert missed < len(samples) / 2
+
+
+def test_the_frame_does_not_matter():
+    rng = np.random.default_rng(77)
+    for _ in range(5):
+        problem = hard_problem(rng, 100)
+        (wanted, first), *others = in_all_frames(*problem)
+        speed = np.linalg.norm(problem[3], axis=-1, keepdims=True)
+        for xi, found in others:
+            assert np.abs((xi - wanted) / speed).max() < 1e-10
+            assert (found.status == first.status).all()
+            assert np.mean(found.iterations != first.iterations) < 0.02

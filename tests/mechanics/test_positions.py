@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 
 import geomech
+from geomech.mathematics.gaits import Circle
 from geomech.scenes import load, toml
 from geomech.scenes.kinds import load_file
-from rft import Chain, Granular
+from rft import Chain, Granular, Viscous
 from rft.bodies import Positions
 from rft.core.refusal import Refusal
 
@@ -94,3 +95,16 @@ def test_parameters_of_a_function_are_keys_of_its_scene(tmp_path):
 def test_functions_that_return_no_poses_are_refused(function, given, says):
     with pytest.raises(Refusal, match=says):
         Positions(function, 2, **({"lengths": (1, 1, 1)} | given))
+
+
+@pytest.mark.parametrize(("function", "lengths", "length"), PAIRS)
+@pytest.mark.parametrize("medium", [Viscous(2.0), SAND])
+def test_three_links_have_the_connection_of_the_chain(
+    function, lengths, length, medium
+):
+    one, two = (
+        geomech.study(medium, body, Circle(), grid=5, extent=2.0)
+        for body in (Positions(function, 2, lengths, length), Chain(lengths, length))
+    )
+    np.testing.assert_allclose(one.tables.fitted.A, two.tables.fitted.A, atol=1e-11)
+    assert one.scene.system.traits.mirror
