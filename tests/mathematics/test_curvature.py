@@ -6,14 +6,10 @@ import sympy as sp
 import xarray
 
 from geomech import scenes
-from geomech.core.variables import Result, Variable
 from geomech.mathematics import symbolic
 from geomech.mathematics.geometry import connection, curvature
-from geomech.mathematics.geometry.representations.field import Field
 from geomech.mathematics.tiers import fitted
-from geomech.questions.swimmers.ccf import zero_line_words
 from geomech.studies.maps import fields
-from geomech.studies.maps.shape_space import zero_line
 from geomech.studies.scene_tables import SceneTables
 from rft import Chain
 from rft.formulas import se2
@@ -102,43 +98,3 @@ def test_files_have_values_units_and_conventions(tmp_path, length, unit):
         assert data[name].attrs["units"] == units
     assert (data.frame, data.length_unit) == ("link-2", unit)
     assert data.sign_of_A == "xi = + A alphadot"
-
-
-AXES = np.linspace(-1.0, 1.5, 11), np.linspace(-1.2, 1.0, 12)
-
-
-def ring(a, b):
-    return (a - 0.25) ** 2 + (b + 0.1) ** 2 - 0.5**2
-
-
-@pytest.mark.parametrize(
-    ("x", "middle", "said"),
-    [
-        (lambda a, b: 1 + a**2, (0.0, 0.0), "none, x has one sign"),
-        (lambda a, b: -1 - b**2, (0.0, 0.0), "none, x has one sign"),
-        (ring, (0.25, -0.1), "0.5 to 0.5 rad from the gait's middle"),
-        (ring, (0.1, 0.1), "0.25 to 0.75 rad from the gait's middle"),
-        (
-            lambda a, b: 0.405 - a,
-            (0.0, 0.0),
-            "0.4 to 0.96 rad from the gait's middle, in 38 % of directions",
-        ),
-        (
-            lambda a, b: a - 1.2,
-            (0.0, 0.0),
-            "further than 1 rad from the gait's middle",
-        ),
-        (
-            lambda a, b: b + 1.1,
-            (0.5, 0.1),
-            "further than 0.9 rad from the gait's middle",
-        ),
-    ],
-)
-def test_the_zero_line_is_looked_for_around_the_gaits_middle(x, middle, said):
-    """Up to the nearest edge, in 72 directions and 200 steps."""
-    values = np.zeros((3, 11, 12))
-    values[0] = x(*np.meshgrid(*AXES, indexing="ij"))
-    line = zero_line(Field(AXES, values, unit="m", length=0.3), np.array(middle))
-    result = Result("ccf", (*line, Variable("ccf", (), values)))
-    assert zero_line_words(result) == f"zero line of x: {said}"

@@ -11,7 +11,7 @@ from geomech.mathematics.systems import Swimmer
 from geomech.scenes import Scene
 from geomech.studies.available import available_tiers
 from geomech.studies.scene_tables import SceneTables
-from rft import Chain, EndCaps, Granular, Serpenoid, SkinFriction, Transient, Viscous
+from rft import Chain, EndCaps, Granular, Serpenoid, SkinFriction, Viscous
 
 pytestmark = pytest.mark.usefixtures("fastest")
 LENGTHS = (0.8, 1.3, 1.0, 0.7)
@@ -20,15 +20,6 @@ ROWS = ((1.4, 0.3, -0.5), (-0.2, 0.9, 2.1))
 MODES = Chain(LENGTHS, 0.3, FRAME, modes=ROWS)
 PLAIN = Chain(LENGTHS, 0.3, FRAME)
 SAND = Granular(1.8, 0.24)
-COS = np.array([[0.5, 0.1], [0.0, 0.2]])
-SIN = np.array([[0.0, 0.1], [0.6, 0.0]])
-CENTRE = np.array([0.1, -0.2])
-GAIT = Fourier(cos=COS.tolist(), sin=SIN.tolist(), centre=CENTRE.tolist())
-SAME = Fourier(
-    cos=(np.transpose(ROWS) @ COS).tolist(),
-    sin=(np.transpose(ROWS) @ SIN).tolist(),
-    centre=(CENTRE @ ROWS).tolist(),
-)
 ROBOT = scenes.load("seven-link-wave")
 RNG = np.random.default_rng(5)
 SHAPE, RATE = RNG.uniform(-0.7, 0.7, (2, 30, 2))
@@ -44,25 +35,6 @@ def test_body_velocity_and_work_are_those_of_the_plain_chain():
     work = rft.work_done(SAND, MODES, SHAPE, RATE, found.xi, **options)
     for a, b in zip(work, rft.work_done(SAND, *same, found.xi, **options), strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("tier", "effects"),
-    [
-        ("direct", ()),
-        ("adapted", ()),
-        ("direct", (EndCaps(radius_m=0.018),)),
-        ("adapted", (EndCaps(radius_m=0.018),)),
-        ("direct", (Transient(travel_m=0.03),)),
-    ],
-)
-def test_tiers_are_those_of_the_plain_chain(tier, effects):
-    poses = []
-    for body, gait in ((MODES, GAIT), (PLAIN, SAME)):
-        scene = Scene(Swimmer(SAND, body, effects), gait)
-        coarse = scene.with_numerics(phases=24, curves=6, cycles=1, pieces=9)
-        poses.append(SceneTables(coarse).poses(tier, None, [0.5, 1.0]))
-    np.testing.assert_allclose(*poses, atol=1e-13)
 
 
 @pytest.mark.parametrize("tier", ["path", "direct"])

@@ -100,7 +100,7 @@ def test_order_in_frames(tmp_path):
 def test_order_along_the_body(kind, tmp_path):
     middle = []
     for n in (28, 112):
-        path = write(tmp_path, kind, count=112, places=n + 1, amplitude=0.05)
+        path = write(tmp_path, kind, count=96, places=n + 1, amplitude=0.05)
         middle.append(off(path, 0.05, slice(10, -10)))
     assert order(middle, [28, 112]) == pytest.approx(4.0, abs=0.4)
     assert off(path, 0.05) < 5e-4
