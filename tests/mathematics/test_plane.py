@@ -99,6 +99,8 @@ def test_planes_have_the_curvature_of_the_pair(pair):
     sign = 1 if pair[0] < pair[1] else -1
     right = np.moveaxis(sign * Cubic().ccf(shapes, *sorted(pair)), -1, 0)
     np.testing.assert_allclose(cut.ccf.values, right, atol=1e-12)
+    sliced = study.two_form.slice(*pair, at).values
+    np.testing.assert_allclose(sliced, right, atol=1e-12)
     looked_up = interpolated_plane(study.fitted, pair, at).connection.A
     np.testing.assert_allclose(looked_up, cut.connection.A, atol=1e-12)
 
