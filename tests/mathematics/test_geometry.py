@@ -5,9 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 import sympy as sp
-from registry import GAITS, MEDIA
-from scipy.special import ndtri
-from scipy.stats import qmc
+from registry import MEDIA
 
 from geomech.mathematics import symbolic
 from geomech.mathematics.gaits import Circle, Ellipse, Fourier
@@ -42,25 +40,6 @@ def test_fit_recovers_a_linear_swimmer():
     np.testing.assert_allclose(fitted(shapes), exact, atol=2e-6)
 
 
-@pytest.mark.parametrize("joints", [1, 3])
-def test_fit_takes_any_number_of_joints(joints):
-    M = np.random.default_rng(1).normal(size=(3, joints))
-
-    def swimmer(alpha, alphadot):
-        return alphadot @ M.T * np.cos(alpha[..., :1])
-
-    fitted = connection.fit(swimmer, connection.grid(joints, 9, 1.0), 16)
-    np.testing.assert_allclose(fitted(np.zeros(joints)), M, atol=1e-12)
-
-
-@pytest.mark.parametrize(("joints", "count"), [(1, 1), (2, 7), (3, 13), (5, 40)])
-def test_directions_are_unit_vectors_that_span(joints, count):
-    unit = connection.directions(joints, count)
-    np.testing.assert_allclose(np.linalg.norm(unit, axis=-1), 1, atol=1e-15)
-    assert unit.shape == (count, joints)
-    assert np.linalg.svd(unit)[1].min() > 0.5
-
-
 def test_fit_residual_is_the_rms_misfit():
     """cos^3 = (3 cos + cos 3) / 4: the plane keeps 3/4 cos, and the misfit is
     cos 3t / 4, of rms sqrt(1/32)."""
@@ -73,70 +52,23 @@ def test_fit_residual_is_the_rms_misfit():
     np.testing.assert_allclose(fitted.A[0, 0], 0.75, atol=1e-14)
     residual = [np.sqrt(1 / 32), 0, 0]
     np.testing.assert_allclose(fitted.residual[:, 2, 3], residual, atol=1e-14)
-    speed = np.sqrt([5 / 16, 1 / 2, 0])
-    np.testing.assert_allclose(fitted.speed[:, 2, 3], speed, atol=1e-14)
-
-
-def test_scattered_directions_are_those_of_halton_and_all_round():
-    unit = connection.directions(3, 200)
-    normal = ndtri(qmc.Halton(3, scramble=False).random(201)[1:])
-    expected = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-    np.testing.assert_array_equal(unit, expected)
-    np.testing.assert_allclose(unit.T @ unit / 200, np.eye(3) / 3, atol=0.02)
 
 
 @pytest.mark.parametrize(("low", "high"), [(-1.0, 3.0), (0.5, 0.9)])
 def test_angles_may_leave_the_grid_by_rounding_only(low, high):
     field = Field((np.linspace(low, high, 9),), np.linspace(0, 1, 9))
     slack = 1e-9 * (high - low)
-    assert field([[low - 0.99 * slack], [high + 0.99 * slack]]) == pytest.approx(
-        [0, 1], abs=1e-8
-    )
-    for out in (low - 1.01 * slack, high + 1.01 * slack):
-        with pytest.raises(ValueError, match="lies outside the field's"):
-            field([out])
-
-
-@pytest.mark.parametrize("ratio", [2.0, 7.5])
-def test_ccf_at_the_straight_pose_for_any_ratio(ratio):
-    fitted = connection.fit(viscous("link-2", ratio), around((0, 0), 0.3), degree=5)
-    expected = [-5 * (ratio - 1) / 243, 0, 0]
-    ccf = curvature.ccf(fitted).values[:, 20, 20]
-    np.testing.assert_allclose(ccf, expected, atol=1e-9)
+    assert field([high + 0.99 * slack]) == pytest.approx(1, abs=1e-8)
+    with pytest.raises(ValueError, match="alpha_1 = .* lies outside the field's"):
+        field([low - 1.01 * slack])
 
 
 def test_ccf_agrees_with_sympy_everywhere():
     fitted = connection.fit(MIDDLE, connection.grid(2, 37, 1.2), degree=5)
-    exact = sp.lambdify(
-        ALPHA, list(symbolic.ccf(symbolic.simplified(A_MIDDLE, ALPHA), ALPHA)), "numpy"
-    )
-    a1, a2 = np.meshgrid(*fitted.axes, indexing="ij")
-    np.testing.assert_allclose(
-        curvature.ccf(fitted).values, np.broadcast_arrays(*exact(a1, a2)), atol=2e-6
-    )
-
-
-@pytest.mark.parametrize(("i", "j"), [(0, 1), (0, 2), (1, 2), (2, 1), (2, 0), (1, 0)])
-def test_small_loops_follow_the_ccf_of_their_joints(i, j):
-    """Every component, about a bent shape of four unlike links."""
-    body = Chain((1, 1.6, 0.7, 1.2), length=0.6, frame="link-2")
-    centre = np.array([0.5, -0.8, 0.3])
-    size = 1e-3
-
-    def solve(alpha, alphadot):
-        return body_velocity(Viscous(3.0), body, alpha, alphadot).xi
-
-    fitted = connection.fit(solve, around(centre, 0.1, 7), 16, degree=5)
-    density = curvature.ccf(fitted, i, j).values[:, 3, 3, 3]
-    cos = size * np.eye(3)[i][:, None]
-    sin = 0.7 * size * np.eye(3)[j][:, None]
-    loop = Fourier(centre=tuple(centre), cos=cos.tolist(), sin=sin.tolist())
-    # From the loop's start, a displacement of order 1 in its size away from the centre.
-    start = se2.exp(fitted(centre)[:, i] * size)
-    moved = se2.compose(start, direct(solve, loop, phases=64))
-    moved = se2.compose(moved, se2.inverse(start)) / (0.7 * np.pi * size**2)
-    np.testing.assert_allclose(moved, density, atol=2e-4 * np.abs(density).max())
-    assert np.abs(density).min() > 1e-4
+    formula = symbolic.ccf(symbolic.simplified(A_MIDDLE, ALPHA), ALPHA)
+    exact = sp.lambdify(ALPHA, list(formula), "numpy")
+    expected = np.broadcast_arrays(*exact(*np.meshgrid(*fitted.axes, indexing="ij")))
+    np.testing.assert_allclose(curvature.ccf(fitted).values, expected, atol=2e-6)
 
 
 @pytest.mark.parametrize("frame", ["mean", "link-1", "link-2", "link-3"])
@@ -182,23 +114,12 @@ def test_area_counts_winding_numbers(gait, winding):
     assert found[0] == pytest.approx(0.01 * np.pi * winding, rel=1e-12, abs=1e-15)
 
 
-@pytest.mark.parametrize("joint", [1, 2])
-@pytest.mark.parametrize("sign", [1, -1])
-def test_leaving_the_field_is_an_error_that_names_the_angle(joint, sign):
-    fitted = connection.fit(MIDDLE, connection.grid(2, 11, 1.0))
-    edge = np.array([0.3, 0.3])
-    edge[joint - 1] = sign * 1.3
-    with pytest.raises(ValueError, match=f"alpha_{joint} = .*1.3 rad lies outside the"):
-        fitted(edge)
-
-
 @pytest.mark.parametrize("frame", ["link-1", "link-2", "link-3"])
 @pytest.mark.parametrize("medium", ["viscous-2", "glass-0.3mm-loose"])
 @pytest.mark.parametrize(
     "mean", [Chain((1, 2, 1), length=0.4), Serpenoid(elements=9, length=0.4, waves=0.8)]
 )
 def test_changing_frame_is_solving_in_that_frame(medium, mean, frame):
-    """Links' headings and rates, through the modes of a backbone too."""
     rng = np.random.default_rng(2)
     alpha = rng.uniform(-2, 2, (30, 2))
     alphadot = rng.normal(size=(30, 2))
@@ -209,14 +130,6 @@ def test_changing_frame_is_solving_in_that_frame(medium, mean, frame):
     h, hdot = mean.frame_pose(frame, alpha, alphadot)
     carried = coordinates.change_velocity(here, h, hdot)
     np.testing.assert_allclose(carried, there, atol=1e-8)
-
-
-@pytest.mark.parametrize("name", GAITS)
-def test_a_reversed_gait_undoes_the_gait(name):
-    forth = GAITS[name]
-    back = dataclasses.replace(forth, reverse=not forth.reverse)
-    g, h = (direct(viscous(), x) for x in (forth, back))
-    np.testing.assert_allclose(se2.compose(g, h), 0, atol=1e-12)
 
 
 @pytest.mark.parametrize("phases", [8, 9])
@@ -230,9 +143,6 @@ def test_a_trajectory_has_the_velocity_it_was_made_from(phases):
     rate = (after - before) / (2 * h)
     x, y = se2.rotated(-at[..., 2], rate[..., 0], rate[..., 1])
     np.testing.assert_allclose(np.stack([x, y, rate[..., 2]], -1), xi, atol=1e-8)
-    theta = at[..., 2] - t * xi[..., 2].mean(1)[:, None]
-    turning = theta - theta.mean(1)[:, None]
-    np.testing.assert_allclose(reconstruct.turning(xi), turning, atol=1e-13)
     end = reconstruct.trajectory(xi, [2 * np.pi])[:, 0]
     np.testing.assert_allclose(end, reconstruct.displacement(xi), atol=1e-13)
 
@@ -268,12 +178,10 @@ def test_bad_shapes_are_refused(make, said):
         make()
 
 
-@pytest.mark.parametrize("name", ["three-link-glass", "three-link-coulomb"])
 @pytest.mark.parametrize("count", [8, 16])
-def test_a_connection_knows_the_error_of_its_directions(name, count):
-    """Against 64 directions, as rms of each row."""
-    velocity = load(name).system.velocity
-    axes = connection.grid(2, 9)
+def test_a_connection_knows_the_error_of_its_directions(count):
+    velocity = load("three-link-glass").system.velocity
+    axes = connection.grid(2, 7)
     few, many = (connection.fit(velocity, axes, n) for n in (count, 64))
     off = np.sqrt(((few.A - many.A) ** 2).mean((1, 2, 3)))
     error = np.sqrt((few.direction_error**2).mean((1, 2, 3)))

@@ -1,8 +1,6 @@
 """The metric of shape space against known numbers and the work of gaits, and shape
 space redrawn by it."""
 
-import collections
-
 import numpy as np
 import pytest
 from scipy.linalg import sqrtm
@@ -42,12 +40,8 @@ def test_viscous_three_link_swimmer(viscous):
     M = np.array([[0.0073160, 0.0050297], [0.0050297, 0.0073160]])
     assert viscous.M[:, :, 15, 15] == pytest.approx(M, abs=1e-7)
 
-    def norm(alpha, alphadot):
-        return np.sqrt(power(FLUID)(alpha, alphadot))
-
-    for length in (viscous.norm, norm):
-        found = metric.path_length(length, Circle(), [1.0])
-        assert found == pytest.approx([0.512235], abs=1e-6)
+    found = metric.path_length(viscous.norm, Circle(), [1.0])
+    assert found == pytest.approx([0.512235], abs=1e-6)
 
 
 def test_the_metric_is_the_power_of_any_rate():
@@ -70,12 +64,8 @@ def test_a_norm_known_in_closed_form_comes_back():
         waves = 0.3 * np.sin(2 * beta) + 0.1 * np.cos(4 * beta)
         return np.linalg.norm(u, axis=-1) * (2 + np.cos(alpha[..., 0]) + waves)
 
-    done = []
-    found = metric.fit_norm(F, axes, 12, progress=done.append, highest=6)
-    assert done[-1] == 1.0
+    found = metric.fit_norm(F, axes, 12, highest=6)
     assert found.residual.max() < 1e-13
-    expected = [2 + np.cos(axes[0][3]), 0, 0.3, 0.1, 0, 0, 0]
-    assert np.abs(found.coefficients[:, 3, 5]) == pytest.approx(expected, abs=1e-13)
     rng = np.random.default_rng(1)
     alpha = rng.uniform(-0.9, 0.9, (40, 2))
     u = rng.normal(size=(40, 2))
@@ -88,24 +78,10 @@ def test_in_sand_length_is_work():
     gait = Ellipse(semi_axes=(1.0, 0.4), tilt=0.7, centre=(0.2, -0.1))
     of_rates = power(SAND, system.body)
     table = metric.fit_norm(of_rates, connection.grid(2, 31, 2.0))
-    assert table.residual.mean() < 0.005 * table.coefficients[0].mean()
     run = system.run(*gait.cycle(256, [0.5, 1.0]), work=True)
     work = run.work.power.mean(-1) * 2 * np.pi
-    exact = metric.path_length(of_rates, gait, [0.5, 1.0])
-    assert exact == pytest.approx(work, rel=1e-10)
     looked_up = metric.path_length(table.norm, gait, [0.5, 1.0])
     assert looked_up == pytest.approx(work, rel=2e-3)
-
-
-@pytest.mark.parametrize("medium", [FLUID, SAND])
-def test_indicatrix_has_unit_cost(medium, viscous):
-    table = viscous
-    if medium is SAND:
-        table = metric.fit_norm(power(SAND), connection.grid(2, 15, 2.0))
-    where = np.array([[0.3, -0.8], [1.2, 1.0]])
-    rates = table.indicatrix(where, 36)
-    assert table.norm(where[:, None] + 0 * rates, rates) == pytest.approx(1)
-    assert np.arctan2(rates[..., 1], rates[..., 0])[:, 9] == pytest.approx(np.pi / 2)
 
 
 @pytest.mark.parametrize(
@@ -166,8 +142,6 @@ def test_a_constant_metric_becomes_its_root(M):
     assert found.field.values == pytest.approx(expected, abs=1e-10)
     area = np.full((9, 9), np.sqrt(np.linalg.det(M)))
     assert found.area.values == pytest.approx(area, rel=1e-9)
-    assert found.largest < 1e-9
-    assert found.folded == 0
 
 
 def bent(alpha):
@@ -186,39 +160,17 @@ def pulled_back(alpha, rate):
 
 
 def test_a_flat_metric_in_disguise_is_flattened():
-    """By order 2; the middle stays."""
     off = []
-    left = []
     for points in (11, 21):
         found = stretch(metric.fit(pulled_back, connection.grid(2, points, 1.5)))
-        middle = found.field.values[:, points // 2, points // 2]
-        assert np.abs(middle).max() < 1e-12
         true = bent(np.moveaxis(shapes(found.field.axes), 0, -1)).reshape(-1, 2)
         u = found.field.values.reshape(2, -1).T
         true -= true.mean(0)
         u = u - u.mean(0)
         turn, _, back = np.linalg.svd(u.T @ true)
         off.append(np.abs(u @ turn @ back - true).max())
-        left.append(found.rms)
-    for errors in (off, left):
-        assert errors[0] < 2e-3
-        assert np.log2(errors[0] / errors[1]) > 1.8
-
-
-def cap(alpha, rate):
-    """Of the unit sphere in longitude and latitude."""
-    return np.cos(alpha[..., 1]) ** 2 * rate[..., 0] ** 2 + rate[..., 1] ** 2
-
-
-def test_a_sphere_does_not_lie_flat():
-    """The residual tells it, and grows with the cap."""
-    small, large = (
-        stretch(metric.fit(cap, connection.grid(2, 15, extent)))
-        for extent in (0.3, 0.9)
-    )
-    assert 1e-4 < small.rms < 0.02 < large.rms < large.largest < 0.5
-    assert np.log(large.rms / small.rms) / np.log(3) == pytest.approx(2, abs=0.3)
-    assert large.distortion.max() <= large.largest
+    assert off[0] < 2e-3
+    assert np.log2(off[0] / off[1]) > 1.8
 
 
 def test_displacement_is_density_times_area_on_paper():
@@ -228,45 +180,6 @@ def test_displacement_is_density_times_area_on_paper():
     here = np.moveaxis(shapes(found.field.axes), 0, -1)
     expected = np.moveaxis(field(here), -1, 0)
     assert found.density(field) * found.area.values == pytest.approx(expected)
-
-
-@pytest.mark.parametrize(("reverse", "word"), [(False, "backwards"), (True, "ahead")])
-def test_the_area_is_shaded_by_what_it_adds(reverse, word):
-    """CCF_x = -1: a counter-clockwise circle goes backwards, a clockwise one ahead."""
-    axes = connection.grid(2, 15, 1.5)
-    values = np.zeros((3, 15, 15))
-    values[0] = -1.0
-    gait = Circle(amplitude=0.8, reverse=reverse)
-    ax = plots.figure(3, 3)[1][0, 0]
-    drawn = plots.ccf_contours(Field(axes, values), 0, [gait], ax=ax)
-    assert [text.get_text() for text in drawn.get_legend().get_texts()] == [word]
-
-
-def test_the_distortion_at_a_shape_is_that_of_the_edges_that_meet_there():
-    """Each against the length of a straight line by a fine sum, of a cap of a sphere
-    that is longer than it is wide."""
-    axes = np.linspace(-0.9, 0.9, 7), np.linspace(-0.2, 1.2, 6)
-    sphere = metric.fit(cap, axes)
-    found = stretch(sphere)
-    u, alpha = (np.moveaxis(x, 0, -1) for x in (found.field.values, shapes(axes)))
-    squares = collections.defaultdict(list)
-    for start in np.ndindex(7, 6):
-        for step in ((1, 0), (0, 1), (1, 1), (1, -1)):
-            end = start[0] + step[0], start[1] + step[1]
-            if end[0] > 6 or not 0 <= end[1] <= 5:
-                continue
-            edge = alpha[end] - alpha[start]
-            along = alpha[start] + (np.arange(40)[:, None] + 0.5) / 40 * edge
-            length = sphere.norm(along, edge + 0 * along).mean()
-            square = (np.linalg.norm(u[end] - u[start]) / length - 1) ** 2
-            squares[start].append(square)
-            squares[end].append(square)
-    expected = [np.sqrt(np.mean(squares[place])) for place in np.ndindex(7, 6)]
-    assert found.distortion.ravel() == pytest.approx(expected, rel=2e-2)
-    edges = np.concatenate([*squares.values()])
-    assert (found.rms, found.largest) == pytest.approx(
-        (np.sqrt(edges.mean()), np.sqrt(edges.max())), rel=1e-2
-    )
 
 
 X, Y = shapes((np.arange(5.0), np.arange(4.0)))
@@ -280,3 +193,22 @@ def test_cells_that_are_turned_over_are_counted_by_triangles(x, y, share):
     """Of a plane that is folded along the middle of its third column of four, the last
     column is turned over."""
     assert inverted_fraction(np.stack([x, y], -1)) == share
+
+
+def test_indicatrix_has_unit_cost(viscous):
+    where = np.array([[0.3, -0.8], [1.2, 1.0]])
+    for table in (viscous, metric.fit_norm(power(SAND), connection.grid(2, 9, 2.0))):
+        rates = table.indicatrix(where, 36)
+        assert table.norm(where[:, None] + 0 * rates, rates) == pytest.approx(1)
+
+
+@pytest.mark.parametrize(("reverse", "word"), [(False, "backwards"), (True, "ahead")])
+def test_the_area_is_shaded_by_what_it_adds(reverse, word):
+    """CCF_x = -1: a counter-clockwise circle goes backwards, a clockwise one ahead."""
+    axes = connection.grid(2, 15, 1.5)
+    values = np.zeros((3, 15, 15))
+    values[0] = -1.0
+    gait = Circle(amplitude=0.8, reverse=reverse)
+    ax = plots.figure(3, 3)[1][0, 0]
+    drawn = plots.ccf_contours(Field(axes, values), 0, [gait], ax=ax)
+    assert [text.get_text() for text in drawn.get_legend().get_texts()] == [word]

@@ -19,7 +19,7 @@ from geomech.mathematics.systems import Swimmer
 from geomech.mathematics.tiers.area import area
 from geomech.studies.maps import fields
 from geomech.studies.scene_tables import SceneTables
-from rft import Chain, ConstantCurvature, Serpenoid, Viscous
+from rft import Chain, Viscous
 from rft.bodies.base import body_size
 from rft.core.refusal import Refusal
 from rft.formulas import se2
@@ -42,10 +42,6 @@ def smallest(first):
     return dataclasses.replace(first, A=minimum_perturbation(first).connection(first))
 
 
-def size(c, rows=(0, 1)):
-    return np.sqrt(sum((c.A[k] ** 2).mean() for k in rows))
-
-
 def test_viscous_three_link_swimmer():
     """Published values, of a coarser discretisation: CCF_x(0, 0) = -0.0204, area
     integral 0.0510; converged -0.020576, 0.0516. Where the frames are parallel and the
@@ -53,19 +49,6 @@ def test_viscous_three_link_swimmer():
     ccf = curvature.ccf(smallest(fitted(Chain())))
     assert ccf.values[:, 15, 15] == pytest.approx([-0.0205761, 0, 0], abs=1e-6)
     assert area(ccf, Circle(), 1.0) == pytest.approx([-0.05164, 0, 0], abs=1e-4)
-
-
-def test_work_is_the_same_in_every_frame():
-    """Power belongs to no frame, whichever the velocity is told in."""
-    scene = scenes.load("three-link-viscous").with_numerics(grid=9, extent=1.0)
-    inner = Swimmer(FLUID, Chain((0.7, 1.4, 0.9), length=0.3))
-    study = SceneTables(scene.changed(system=inner))
-    outer = study.in_frame("minimum-perturbation").scene.system
-    alpha, alphadot = np.random.default_rng(4).uniform(-0.8, 0.8, (2, 20, 2))
-    xi = [system.velocity(alpha, alphadot) for system in (inner, outer)]
-    power = [s.power(alpha, alphadot, v) for s, v in zip((inner, outer), xi)]
-    np.testing.assert_allclose(*power, rtol=1e-9)
-    assert np.abs(xi[1] - xi[0]).max() > 1e-3
 
 
 @pytest.mark.parametrize("body", [Chain((0.7, 1.4, 0.9), length=0.3), Chain((1, 2, 3))])
@@ -85,10 +68,8 @@ def test_it_is_the_same_frame_wherever_one_starts(body):
 
 
 @pytest.mark.parametrize(("moved", "rows"), [(0, (0, 1)), (1, (0, 1)), (2, (2,))])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_no_frame_nearby_has_a_smaller_connection(moved, rows, seed):
-    """Moved along x or y, or turned, by a sum of waves: the mean square of A is flat at
-    the minimum."""
     first = fitted(Chain((0.7, 1.4, 0.9)))
     frame = minimum_perturbation(first)
     c = dataclasses.replace(first, A=frame.connection(first))
@@ -104,35 +85,6 @@ def test_no_frame_nearby_has_a_smaller_connection(moved, rows, seed):
         nodes = basis.at_nodes(basis.coefficients(near[list(rows)]))
         sizes.append(basis.weighted(nodes**2).sum())
     assert sizes[1] < min(sizes[0], sizes[2])
-    slope = (sizes[2] - sizes[0]) / (sizes[2] + sizes[0] - 2 * sizes[1])
-    assert abs(slope) < 0.1
-
-
-def test_it_converges_with_the_grid():
-    shapes = np.array([[0.9, -1.3], [2.2, 1.7], [-0.4, 0.3]])
-    poses = []
-    for points in (9, 33, 65):
-        frame = minimum_perturbation(fitted(Chain((0.7, 1.4, 0.9)), points))
-        assert frame.residual < 1e-10
-        poses.append(frame.pose(shapes))
-    coarse, fine = (np.abs(pose - poses[-1]).max() for pose in poses[:2])
-    assert fine < 1e-5
-    assert np.log2(coarse / fine) / 2 > 2.8
-
-
-@pytest.mark.parametrize(
-    ("body", "points"),
-    [
-        (Serpenoid(elements=12, waves=1.2), 21),
-        (ConstantCurvature(elements=12, sections=2), 21),
-        (Chain((1, 1, 1, 2)), 11),
-    ],
-)
-def test_it_makes_the_connection_of_any_body_smaller(body, points):
-    first = fitted(body, points, 1.5)
-    c = smallest(first)
-    assert size(c) <= 1.001 * size(first)
-    assert size(c, [2]) <= 1.001 * size(first, [2])
 
 
 SCENE = """frame = "minimum-perturbation"
@@ -145,7 +97,6 @@ LAWS = {"viscous": "ratio = 2.0", "granular": "C = 1.8\ngamma0 = 0.24"}
 
 @pytest.mark.parametrize("law", LAWS)
 def test_a_scene_in_it(law):
-    """All tiers agree with the frame of the body by carrying over."""
     scene = scenes.parse(SCENE.format(law=law, numbers=LAWS[law]))
     study = SceneTables(scene)
     plain = SceneTables(scene.changed(system=scene.system.inner))
@@ -154,12 +105,8 @@ def test_a_scene_in_it(law):
     for tier, atol in (("direct", 1e-14), ("path", 1e-3), ("harmonic", 1e-3)):
         carried = frame.net(plain.poses(tier), start)
         np.testing.assert_allclose(study.poses(tier)[:2], carried[:2], atol=atol)
-    assert np.abs(study.poses("direct") - plain.poses("direct")).max() > 3e-4
     expected = frame.connection(plain.fitted)
     assert study.fitted.A == pytest.approx(expected, abs=1e-12)
-    # The heading's rate does not depend on the frame.
-    residual = plain.fitted.residual[2]
-    assert study.fitted.residual[2] == pytest.approx(residual, abs=1e-12)
 
 
 def test_a_scene_in_it_is_read_back_and_solved_anew_where_its_grid_changes():
@@ -170,41 +117,17 @@ def test_a_scene_in_it_is_read_back_and_solved_anew_where_its_grid_changes():
     assert scene.with_numerics(tolerance=1e-8).system.inner.solver.tolerance == 1e-8
 
 
-ABOVE = SCENE.format(law="viscous", numbers=LAWS["viscous"])
-LINE, _, BARE = ABOVE.replace("grid = 15", "grid = 7").partition("\n")
-IN_BODY = BARE.replace('kind = "chain"', f'kind = "chain"\n{LINE}')
-IN_SYSTEM = IN_BODY.replace("[medium]", "[system.medium]").replace(
-    "[body]", "[system.body]"
-)
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        IN_BODY,
-        f"{LINE}\n{IN_BODY}",
-        f'[system]\nkind = "swimmer"\n{IN_SYSTEM}',
-    ],
-)
-def test_it_stands_wherever_any_frame_stands(text):
-    scene = scenes.parse(text)
-    assert scene == scenes.parse(f"{LINE}\n{BARE}")
-    assert scene.frame == "minimum-perturbation"
-
-
-@pytest.mark.parametrize("frame", ["mean", "link-2"])
-def test_frames_that_contradict_each_other_are_refused(frame):
-    said = (
-        rf"\[body\] frame = 'minimum-perturbation', but the scene's frame = '{frame}'"
-    )
-    with pytest.raises(Refusal, match=said):
-        scenes.parse(f'frame = "{frame}"\n{IN_BODY}')
-
-
 def test_its_file_has_the_pose_of_the_frame(tmp_path):
-    scene = scenes.parse(f"{LINE}\n{BARE}")
+    scene = scenes.parse(SCENE.format(law="viscous", numbers=LAWS["viscous"]))
     fields.save_connection(tmp_path / "c.nc", SceneTables(scene))
     with netcdf_file(tmp_path / "c.nc", mmap=False) as file:
         pose = file.variables["frame_pose"]
         assert np.array(pose[:]) == pytest.approx(scene.system.field.field.values)
         assert pose.units == b"m, m, rad"
+
+
+def test_frames_that_contradict_each_other_are_refused():
+    text = SCENE.format(law="viscous", numbers=LAWS["viscous"])
+    text = text.replace("minimum-perturbation", "link-2")
+    with pytest.raises(Refusal, match="but the scene's frame = 'link-2'"):
+        scenes.parse(text.replace('"chain"', '"chain"\nframe = "minimum-perturbation"'))

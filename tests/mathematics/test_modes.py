@@ -7,13 +7,11 @@ import pytest
 import rft
 from geomech import scenes
 from geomech.mathematics.gaits import Circle, Fourier, Wave
-from geomech.mathematics.systems import Swimmer, Table
-from geomech.mathematics.systems.base import shape_labels
+from geomech.mathematics.systems import Swimmer
 from geomech.scenes import Scene
 from geomech.studies.available import available_tiers
-from geomech.studies.maps import fields
-from geomech.studies.scene_tables import SceneTables, refuse_outside
-from rft import Chain, EndCaps, Granular, Serpenoid, SkinFriction, Transient, Viscous
+from geomech.studies.scene_tables import SceneTables
+from rft import Chain, EndCaps, Granular, Serpenoid, SkinFriction, Viscous
 
 pytestmark = pytest.mark.usefixtures("fastest")
 LENGTHS = (0.8, 1.3, 1.0, 0.7)
@@ -22,15 +20,6 @@ ROWS = ((1.4, 0.3, -0.5), (-0.2, 0.9, 2.1))
 MODES = Chain(LENGTHS, 0.3, FRAME, modes=ROWS)
 PLAIN = Chain(LENGTHS, 0.3, FRAME)
 SAND = Granular(1.8, 0.24)
-COS = np.array([[0.5, 0.1], [0.0, 0.2]])
-SIN = np.array([[0.0, 0.1], [0.6, 0.0]])
-CENTRE = np.array([0.1, -0.2])
-GAIT = Fourier(cos=COS.tolist(), sin=SIN.tolist(), centre=CENTRE.tolist())
-SAME = Fourier(
-    cos=(np.transpose(ROWS) @ COS).tolist(),
-    sin=(np.transpose(ROWS) @ SIN).tolist(),
-    centre=(CENTRE @ ROWS).tolist(),
-)
 ROBOT = scenes.load("seven-link-wave")
 RNG = np.random.default_rng(5)
 SHAPE, RATE = RNG.uniform(-0.7, 0.7, (2, 30, 2))
@@ -46,25 +35,6 @@ def test_body_velocity_and_work_are_those_of_the_plain_chain():
     work = rft.work_done(SAND, MODES, SHAPE, RATE, found.xi, **options)
     for a, b in zip(work, rft.work_done(SAND, *same, found.xi, **options), strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("tier", "effects"),
-    [
-        ("direct", ()),
-        ("adapted", ()),
-        ("direct", (EndCaps(radius_m=0.018),)),
-        ("adapted", (EndCaps(radius_m=0.018),)),
-        ("direct", (Transient(travel_m=0.03),)),
-    ],
-)
-def test_tiers_are_those_of_the_plain_chain(tier, effects):
-    poses = []
-    for body, gait in ((MODES, GAIT), (PLAIN, SAME)):
-        scene = Scene(Swimmer(SAND, body, effects), gait)
-        coarse = scene.with_numerics(phases=24, curves=6, cycles=1, pieces=9)
-        poses.append(SceneTables(coarse).poses(tier, None, [0.5, 1.0]))
-    np.testing.assert_allclose(*poses, atol=1e-13)
 
 
 @pytest.mark.parametrize("tier", ["path", "direct"])
@@ -126,17 +96,6 @@ def test_modes_go_through_scene_files(body):
     assert scenes.parse(scenes.toml(scene)).system == scene.system
 
 
-def test_a_serpenoid_has_one_wave_if_it_does_not_say():
-    first = Chain((1,) * 5, modes="serpenoid").joint_angles(np.eye(2))[0]
-    angle = 2 * np.pi / 5
-    np.testing.assert_allclose(first, [np.cos(angle), np.sin(angle)], atol=1e-15)
-
-
-def test_shape_variables_of_modes_have_names_of_their_own():
-    assert shape_labels(Swimmer(SAND, MODES)) == (("m_1", "rad"), ("m_2", "rad"))
-    assert shape_labels(Swimmer(SAND, PLAIN))[2] == ("alpha_3", "rad")
-
-
 # Waves.
 
 
@@ -149,19 +108,6 @@ def test_a_wave_is_a_circle_in_serpenoid_modes(waves):
     for angles, amplitudes in zip(wave.cycle(16), circle.cycle(16), strict=True):
         found = body.joint_angles(amplitudes.T).T
         np.testing.assert_allclose(angles, found, atol=1e-14)
-    for tier in ("direct", "adapted"):
-        poses = []
-        for chain, gait in ((Chain(lengths), wave), (body, circle)):
-            scene = Scene(Swimmer(SAND, chain), gait).with_numerics(phases=32, curves=6)
-            poses.append(SceneTables(scene).poses(tier))
-        np.testing.assert_allclose(*poses, atol=1e-13)
-
-
-def test_a_wave_runs_to_the_tail():
-    wave = Wave(joints=40, waves=1.5)
-    crests = np.argmax(wave.shape(np.linspace(0, 1, 5))[:, 8:32], axis=-1)
-    assert (np.diff(crests) <= 0).all()
-    assert crests[-1] < crests[0]
 
 
 @pytest.mark.parametrize(
@@ -189,8 +135,6 @@ def test_an_offset_turns_the_body():
     )
     assert left > 0.05
     assert right == pytest.approx(-left, abs=1e-12)
-    degrees = scenes.parse(ROBOT.text + "offset_deg = 9.0\n")
-    assert degrees.gait.offset == pytest.approx(np.pi / 20)
 
 
 def test_a_wave_is_about_its_centre_and_offset():
@@ -204,16 +148,3 @@ def test_a_wave_of_seven_links_swims_as_in_grains():
     0.757 body lengths long."""
     net = np.hypot(*SceneTables(ROBOT).poses("direct", amplitudes=[0.87])[0, :2])
     assert net / 0.757 == pytest.approx(0.34, abs=0.02)
-
-
-@pytest.mark.parametrize("ending", ["nc", "mat"])
-def test_a_table_keeps_the_names_of_modes(tmp_path, ending):
-    scene = Scene(Swimmer(SAND, MODES), Circle(amplitude=0.4))
-    coarse = scene.with_numerics(grid=5, extent=0.6, phases=16)
-    fields.save_connection(tmp_path / f"a.{ending}", SceneTables(coarse))
-    table = Scene(Table(tmp_path / f"a.{ending}"), Circle(amplitude=9.0))
-    fields.save_connection(tmp_path / f"b.{ending}", SceneTables(table))
-    again = Table(tmp_path / f"b.{ending}")
-    assert shape_labels(again) == (("m_1", "rad"), ("m_2", "rad"))
-    with pytest.raises(ValueError, match="m_1 = .* lies outside"):
-        refuse_outside(table)

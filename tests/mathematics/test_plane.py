@@ -6,22 +6,19 @@ import dataclasses
 import numpy as np
 import pytest
 from commands import geomech
-from tabled import of_json, tabled
+from registry import DATA
+from tabled import tabled
 
 from geomech import Numerics, Scene
 from geomech.io.results import to_xarray
-from geomech.mathematics.gaits import Circle, Fourier, Wave
-from geomech.mathematics.geometry import connection, curvature
+from geomech.mathematics.gaits import Fourier, Wave
+from geomech.mathematics.geometry import connection
 from geomech.mathematics.geometry.representations.plane import (
-    Plane,
-    ProjectedGait,
     interpolated_plane,
     plane,
 )
 from geomech.mathematics.geometry.traits import Traits
-from geomech.mathematics.geometry.two_form import spanned, spanned_by, two_form
-from geomech.mathematics.systems import Swimmer, Table
-from geomech.mathematics.tiers.area import area
+from geomech.mathematics.systems import Swimmer
 from geomech.mathematics.tiers.fitted import finest_grid, is_too_large
 from geomech.questions.swimmers.run import Run
 from geomech.studies.maps import fields
@@ -41,23 +38,6 @@ LOOP = Fourier(
 )
 COARSE = Numerics(grid=7, extent=1.2)
 PAIRS = ((0, 1), (0, 2), (1, 2))
-SCENE = """[medium]
-law = "viscous"
-ratio = 2.3
-[body]
-kind = "chain"
-lengths = [0.7, 1.4, 0.9, 0.6]
-length = 0.5
-[gait]
-kind = "fourier"
-cos = [[0.5, 0.0], [0.1, 0.1], [-0.3, 0.1]]
-sin = [[0.1, 0.1], [0.6, 0.0], [0.2, -0.2]]
-centre = [0.1, -0.2, 0.15]
-[numerics]
-grid = 7
-extent = 1.2
-phases = 32
-"""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -123,45 +103,21 @@ def test_planes_have_the_curvature_of_the_pair(pair):
     np.testing.assert_allclose(sliced, right, atol=1e-12)
     looked_up = interpolated_plane(study.fitted, pair, at).connection.A
     np.testing.assert_allclose(looked_up, cut.connection.A, atol=1e-12)
-    assert cut.fixed == [k for k in range(3) if k not in pair]
 
 
-@pytest.mark.parametrize(
-    ("at", "count"),
-    [([0.6, 0.6, -1.2], 25), ([0.0, 0.0, 0.0], 13)],  # left and right are alike there
-)
-def test_a_plane_is_that_of_the_whole_field_in_sand(at, count):
+@pytest.mark.parametrize("at", [[0.6, 0.6, -1.2], [0.0, 0.0, 0.0]])
+def test_a_plane_is_that_of_the_whole_field_in_sand(at):
     system = Swimmer(GLASS, FOUR_LINKS)
     axes = connection.grid(3, 5, 1.2)
     options = {"traits": system.traits, "trusted": True}
     fitted = connection.fit(system.velocity, axes, 16, **options)
-    solved = []
-
-    def velocity(alpha, alphadot):
-        solved.append(len(alpha))
-        return system.velocity(alpha, alphadot)
-
-    pair_axes = (axes[0], axes[2])
-    cut = plane(velocity, pair_axes, (0, 2), at, 16, traits=Traits(mirror=True))
+    given = system.velocity, (axes[0], axes[2]), (0, 2), at, 16
+    cut = plane(*given, traits=Traits(mirror=True))
     k = np.abs(axes[1] - at[1]).argmin()
     A = fitted.A[:, [0, 2]][..., k, :]
     np.testing.assert_allclose(cut.connection.A, A, atol=1e-9)
     residual = fitted.residual[..., k, :]
     np.testing.assert_allclose(cut.connection.residual, residual, atol=1e-9)
-    assert sum(solved) == count
-
-
-def test_a_gait_lies_in_a_plane_where_it_keeps_the_other_joints():
-    flat = Fourier(
-        cos=((0.5,), (0.0,), (0.0,)),
-        sin=((0.0,), (0.0,), (0.4,)),
-        centre=(0.1, -0.2, 0.15),
-    )
-    field = of_cubic().plane((0, 2)).connection
-    for at, lies in ((-0.2, True), (-0.1, False)):
-        cut = Plane((0, 2), (0.0, at, 0.0), field)
-        assert ProjectedGait(flat, cut).lies_in_plane == lies
-        assert not ProjectedGait(LOOP, cut).lies_in_plane
 
 
 def test_many_joints_have_planes_and_no_field():
@@ -169,12 +125,8 @@ def test_many_joints_have_planes_and_no_field():
     numerics = Numerics(grid=5, extent=1.0)
     study = SceneTables(Scene(swimmer, Wave(amplitude=0.5, joints=8), numerics))
     assert study.plane((6, 2)).ccf.values.shape == (3, 5, 5)
-    for pair, at, said in (
-        ((2, 8), None, "a pair must be two of the joints 1 to 8, got 3, 9"),
-        ((0, 1), np.full(8, 1.1), "lies outside the field"),
-    ):
-        with pytest.raises(ValueError, match=said):
-            study.plane(pair, at)
+    with pytest.raises(ValueError, match="lies outside the field"):
+        study.plane((0, 1), np.full(8, 1.1))
 
 
 @pytest.mark.parametrize(
@@ -209,8 +161,6 @@ def test_positions_depend_on_the_surface_by_order_three_and_turning_does_not():
     spread = np.array(found["surface_spread"]["area"])
     estimates = np.array(found["estimate"]["area"])
     off = np.array(found["area"]) - found["direct"]
-    assert spread[2] > 1e-4
-    assert np.max(found["surface_spread_heading"]["area"]) < 1e-12
     assert (estimates >= spread).all()
     np.testing.assert_allclose(estimates, np.hypot(*off[:, :2].T), rtol=1e-6)
     np.testing.assert_allclose(off[:, 2], 0.0, atol=1e-12)
@@ -241,60 +191,6 @@ def test_the_spread_is_that_of_another_surface():
     assert spread[0, 0] == pytest.approx(apart, rel=0.02)
     poses = study.poses("area", amplitudes=[0.8])
     np.testing.assert_allclose(poses[0], middle, atol=3e-4)
-
-
-def test_the_integral_by_stokes_is_that_of_the_two_form():
-    axes = connection.grid(3, 6, 1.2)
-    form = two_form(connection.fit(Cubic().velocity, axes, 12, 5))
-    found = spanned(form, LOOP, [0.5, 1.0], 128, 2)
-    by_stokes = spanned_by(Cubic().A, LOOP, [0.5, 1.0], 128, 2, 128)
-    assert found.others.shape == (2, 2, 3)
-    np.testing.assert_allclose(found.net, by_stokes.net, atol=1e-12)
-    np.testing.assert_allclose(found.others, by_stokes.others, atol=1e-12)
-    np.testing.assert_allclose(found.spread, by_stokes.spread, atol=1e-12)
-
-
-@pytest.fixture(scope="module")
-def fluid():
-    system = Swimmer(Viscous(2.3), FOUR_LINKS)
-    axes = connection.grid(3, 13, 1.2)
-    return connection.fit(system.velocity, axes, 48, 5, traits=system.traits)
-
-
-def test_pairs_are_antisymmetric_and_those_of_curvature(fluid):
-    form = two_form(fluid)
-    assert form.pairs == PAIRS
-    for i, j in PAIRS:
-        values = curvature.ccf(fluid, i, j).values
-        np.testing.assert_array_equal(form.pair(i, j).values, values)
-        np.testing.assert_array_equal(form.pair(j, i).values, -values)
-    alpha, u, v = np.random.default_rng(0).uniform(-1, 1, (3, 5, 3))
-    twice = form(alpha, u, 2 * v + 3 * u)
-    np.testing.assert_allclose(twice, -2 * form(alpha, v, u), atol=1e-13)
-
-
-def test_with_two_joints_every_surface_is_the_area():
-    system = Swimmer(Viscous(2.3), Chain((0.7, 1.4, 0.9)))
-    axes = connection.grid(2, 31, 1.5)
-    fitted = connection.fit(system.velocity, axes, 8, 5, traits=system.traits)
-    gait = Circle(centre=(0.1, -0.2))
-    found = spanned(two_form(fitted), gait, [0.4, 1.0])
-    expected = area(curvature.ccf(fitted), gait, [0.4, 1.0])
-    assert found.net == pytest.approx(expected, abs=1e-8)
-    assert found.spread.max() < 1e-8
-
-
-@pytest.mark.parametrize(
-    ("ask", "said"),
-    [
-        (lambda form: form.pair(1, 1), "two of the joints"),
-        (lambda form: spanned(form, Circle()), "moves 2 joints"),
-        (lambda form: spanned(form, LOOP, [3.0]), "outside the field"),
-    ],
-)
-def test_what_spans_nothing_is_refused(ask, said, fluid):
-    with pytest.raises(ValueError, match=said):
-        ask(two_form(fluid))
 
 
 # Beyond a field.
@@ -333,13 +229,9 @@ def test_beyond_the_field_tiers_solve_around_the_gait():
     study = SceneTables(Scene(Sandy(), gait, numerics))
     beyond = study.with_numerics(grid=15)
     found, around = (tabled(x.displacements(*asked)) for x in (study, beyond))
-    assert "field" in found["seconds"]
     assert "field" not in around["seconds"]
     for tier in ("area", "path"):
         np.testing.assert_allclose(around[tier], found[tier], atol=3e-5)
-    spreads = [x["surface_spread"]["area"] for x in (around, found)]
-    assert spreads[0] == pytest.approx(spreads[1], rel=0.3)  # fewer surfaces
-    assert beyond.cost(*asked).balances >= beyond.plan("path").balances(2, 256)
 
 
 @pytest.mark.parametrize(
@@ -356,26 +248,19 @@ def test_three_joints_keep_their_field_and_more_have_one_that_fits(
 # Files and commands.
 
 
-def test_a_file_of_three_joints_has_all_pairs(tmp_path):
+def test_a_file_of_three_joints_has_all_pairs():
     numerics = Numerics(grid=7, extent=1.2)
     study = SceneTables(Scene(Swimmer(Viscous(2.3), FOUR_LINKS), LOOP, numerics))
-    fields.save_connection(tmp_path / "a.nc", study)
-    table = SceneTables(Scene(Table(tmp_path / "a.nc"), LOOP))
-    assert table.tiers == ("area", "adapted", "path", "direct")
-    np.testing.assert_array_equal(table.fitted.A, study.fitted.A)
     data = to_xarray(fields.full_result(study))
     assert data["pair_joints"].values.tolist() == [[1, 2], [1, 3], [2, 3]]
     second = study.two_form.pair(0, 2).values
     np.testing.assert_array_equal(data["ccf_pairs"][1], second)
 
 
-def test_commands_tell_the_spread_and_the_angle_of_a_slice(tmp_path):
-    (tmp_path / "s.toml").write_text(SCENE)
-    args = ("displacement", "s.toml", "--amplitudes", "0.5,1", "--tiers", "area")
-    out = geomech(*args, "--json", cwd=tmp_path)[1]
-    assert of_json(out)["surface_spread"].unit == "m"
+def test_pictures_tell_the_angle_of_a_slice(tmp_path):
+    scene = DATA / "frozen" / "four.toml"
     options = ("--pair", "3,1", "--slice", "20deg", "--plot", "a.svg")
-    code, _, err = geomech("ccf", "s.toml", *options, cwd=tmp_path)
+    code, _, err = geomech("ccf", str(scene), *options, cwd=tmp_path)
     assert (code, err) == (0, "")
     assert "0.349 rad" in (tmp_path / "a.svg").read_text()
 
@@ -383,4 +268,3 @@ def test_commands_tell_the_spread_and_the_angle_of_a_slice(tmp_path):
 def test_a_run_of_three_joints_has_its_field_and_tiers():
     scene = Scene(Swimmer(Viscous(2.3), FOUR_LINKS), LOOP, Numerics(grid=5, extent=1.2))
     assert {"area", "path", "direct"} <= {*Run(scene).ask()["tier"].values}
-    assert Run(scene).cost().balances >= 5**3 // 2 * 12 + 3 * 5**2 * 12

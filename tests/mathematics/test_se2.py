@@ -87,12 +87,3 @@ def test_bracket_is_the_commutator_of_matrices():
     X, Y = poses(2)
     commutator = matrix(X) @ matrix(Y) - matrix(Y) @ matrix(X)
     np.testing.assert_allclose(matrix(se2.bracket(X, Y)), commutator, atol=1e-13)
-
-
-def test_batches_and_shapes():
-    g = np.random.default_rng(0).normal(size=(4, 1, 3))
-    h = np.random.default_rng(1).normal(size=(5, 3))
-    assert se2.compose(g, h).shape == (4, 5, 3)
-    assert se2.adjoint(g).shape == (4, 1, 3, 3)
-    with pytest.raises(ValueError, match=r"shape \(\.\.\., 3\), got \(2,\)"):
-        se2.exp([1.0, 2.0])

@@ -4,15 +4,9 @@ more."""
 import numpy as np
 import pytest
 
-from geomech.mathematics.gaits import Fourier
 from geomech.mathematics.geometry import connection
 from geomech.mathematics.geometry.representations import harmonics
-from geomech.mathematics.geometry.traits import Traits
 from geomech.mathematics.systems import Swimmer
-from geomech.mathematics.tiers import harmonic
-from geomech.scenes import Numerics, Scene
-from geomech.studies.available import default_tiers
-from geomech.studies.scene_tables import SceneTables
 from rft import CATALOGUE, Chain
 
 pytestmark = pytest.mark.usefixtures("fastest")
@@ -44,24 +38,9 @@ def test_polynomials_on_the_sphere_come_back(joints, highest):
     u = 3.0 * rng.normal(size=(20, joints))
     expected = cubic(alpha, u)
     np.testing.assert_allclose(table.velocity(alpha, u), expected, atol=1e-10)
-    back = table.velocity(alpha, -2.0 * u)
-    np.testing.assert_allclose(back, -2.0 * expected, atol=1e-10)
     assert table.residual.max() < 1e-10
-    assert not table.velocity(alpha, 0 * u).any()
     half = table.half(0).velocity(alpha, u)[..., 0]
     np.testing.assert_allclose(half, expected[..., 0], atol=1e-10)
-
-
-@pytest.mark.parametrize("joints", [2, 3])
-def test_the_first_degree_is_the_connection(joints):
-    system = Swimmer(GLASS, Chain((0.7, 1.4, 0.9, 0.6)[: joints + 1]))
-    axes = connection.grid(joints, 4, 1.0)
-    fitted = connection.fit(system.velocity, axes, 24, traits=system.traits)
-    traits = Traits(mirror=True)
-    table = harmonics.fit(system.velocity, axes, 24, highest=1, traits=traits)
-    alpha, u = np.random.default_rng(1).uniform(-1, 1, (2, 9, joints))
-    expected = fitted.velocity(alpha, u)
-    np.testing.assert_allclose(table.velocity(alpha, u), expected, atol=1e-12)
 
 
 def test_what_they_leave_is_that_of_other_directions_and_falls():
@@ -72,36 +51,9 @@ def test_what_they_leave_is_that_of_other_directions_and_falls():
     u = rng.normal(size=(400, 3))
     u /= np.linalg.norm(u, axis=-1, keepdims=True)
     truth = system.velocity(alpha, u)
-    left = []
-    for highest, count in ((1, 24), (5, 42), (9, 110)):
+    for highest, count, most in ((5, 42, 0.3), (9, 110, 0.12)):
         table = harmonics.fit(system.velocity, axes, count, highest=highest)
-        off = table.velocity(alpha, u) - truth
-        left.append(np.sqrt((off**2).mean(0)))
+        left = np.sqrt(((table.velocity(alpha, u) - truth) ** 2).mean(0))
         residual = np.sqrt((table.residual**2).mean((1, 2, 3)))
-        np.testing.assert_allclose(residual, left[-1], rtol=0.35)
-    assert (left[1] < 0.6 * left[0]).all()
-    assert (left[2] < 0.25 * left[0]).all()
-
-
-def test_three_joints_in_sand_within_a_few_percent():
-    """Where the connection alone is out by half."""
-    system = Swimmer(GLASS, Chain((0.7, 1.4, 0.9, 0.6)))
-    gait = Fourier(
-        cos=((1.0, 0.0), (0.2, 0.3), (-0.5, 0.2)),
-        sin=((0.1, 0.2), (0.9, 0.0), (0.4, -0.4)),
-    )
-    study = SceneTables(Scene(system, gait, Numerics(grid=6, extent=0.6, phases=64)))
-    assert "harmonic" not in default_tiers(system)
-    assert harmonic.directions(system, study.scene.numerics) == 110
-    true, by_harmonics, by_A = (
-        study.poses(tier, None, [0.4])[0, :2] for tier in ("direct", "harmonic", "path")
-    )
-    size = np.hypot(*true)
-    assert np.hypot(*(by_harmonics - true)) < 0.05 * size
-    assert np.hypot(*(by_A - true)) > 0.4 * size
-
-
-def test_too_many_are_refused():
-    said = "harmonics of 3 joints up to 5 take 21 directions or more, got 20"
-    with pytest.raises(ValueError, match=said):
-        harmonics.fit(cubic, connection.grid(3, 4), 20, highest=5)
+        np.testing.assert_allclose(residual, left, rtol=0.35)
+        assert (left < most * np.sqrt((truth**2).mean(0))).all()

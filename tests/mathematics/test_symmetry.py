@@ -13,13 +13,12 @@ from geomech.mathematics.geometry.representations import harmonics
 from geomech.mathematics.geometry.representations.images import (
     cycle_images,
     images,
-    solved_count,
 )
 from geomech.mathematics.geometry.traits import NOTHING, Traits
 from geomech.mathematics.systems.swimmer import Swimmer
 from geomech.scenes.model import Scene
 from geomech.studies.scene_tables import SceneTables
-from rft import CATALOGUE, Chain, EndCaps, GrainInertia, SkinFriction
+from rft import CATALOGUE, Chain, EndCaps, SkinFriction
 from rft.bodies.base import body_size, is_reversible
 from rft.core.premise import Premise
 from rft.core.refusal import Refusal
@@ -36,7 +35,6 @@ REVERSIBLE = {"three", "three-middle", "five", "backbone"}
 
 @pytest.mark.parametrize("name", BODIES)
 def test_which_bodies_are_reversible(name):
-    """Not with a link longer at one end, a frame at one end, modes that are not."""
     assert is_reversible(BODIES[name]) == (name in REVERSIBLE)
 
 
@@ -177,7 +175,6 @@ BACK = Circle(amplitude=0.7, reverse=True)
     ],
 )
 def test_gaits_are_those_of_all_phases(body, effects, gait, amplitudes, phases, count):
-    """Though only some of their phases are solved."""
     swimmer = Swimmer(GLASS, body, effects)
     alpha, alphadot = gait.cycle(phases, amplitudes)
     assert cycle_images(alpha, alphadot, swimmer.traits).count == count
@@ -187,50 +184,6 @@ def test_gaits_are_those_of_all_phases(body, effects, gait, amplitudes, phases, 
     np.testing.assert_allclose(run.xi / size, xi / size, rtol=0, atol=1e-10)
     power = swimmer.work(alpha, alphadot, xi).power
     np.testing.assert_allclose(run.work.power, power, rtol=1e-8, atol=1e-12)
-
-
-@dataclasses.dataclass(frozen=True)
-class Late(Fourier):
-    """A gait that begins a part of a cycle later."""
-
-    start: float = 0.0
-
-    def unit(self, t):
-        return super().unit(np.asarray(t) + 2 * np.pi * self.start)
-
-    def unit_rate(self, t):
-        return super().unit_rate(np.asarray(t) + 2 * np.pi * self.start)
-
-
-COS, SIN = np.random.default_rng(5).normal(size=(2, 2, 3))
-ODD = [1, 0, 1]
-
-
-@pytest.mark.parametrize(
-    ("cos", "sin", "shares"),
-    [
-        (COS, SIN, [1, 1, 1, 1]),
-        (COS * ODD, SIN * ODD, [1, 2, 1, 2]),
-        (COS[[0, 0]] * [[-1], [1]], SIN[[0, 0]], [1, 1, 2, 2]),
-        (COS[[0, 0]], SIN[[0, 0]] * [[1], [-1]], [1, 1, 1, 2]),
-        (COS[[0, 0]] * ODD, SIN[[0, 0]] * ODD * [[1], [-1]], [1, 2, 2, 4]),
-    ],
-    ids=["none", "mirrored", "backwards", "backwards in a mirror", "both"],
-)
-@pytest.mark.parametrize("start", [0.0, 0.1])
-def test_few_phases_tell_how_many_are_solved(cos, sin, shares, start):
-    """Of any number; images lie on phases of some of these only."""
-    gait = Late(cos=cos.tolist(), sin=sin.tolist(), start=start)
-    for traits, share in zip((NOTHING, MIRROR, BACKWARDS, BOTH), shares):
-        for phases in (*range(8, 33), 201, 1024, 2049, 4096):
-            solved = cycle_images(*gait.cycle(phases), traits).count
-            assert solved_count(gait, phases, traits) == solved
-            assert solved >= phases // share
-
-
-def test_a_million_phases_are_counted():
-    assert solved_count(Circle(), 1_000_000, BOTH) == 250_001
-    assert solved_count(Sine(elements=100), 1_000_000, MIRROR) == 500_000
 
 
 @pytest.mark.parametrize("part", [0, 1])
@@ -247,21 +200,6 @@ def test_what_is_nearly_an_image_is_none(part, gait, off, place):
 def test_gaits_side_by_side_have_the_images_that_all_have():
     cycles = zip(Circle().cycle(32), Butterfly().cycle(32))
     assert cycle_images(*map(np.stack, cycles), BOTH).count == 16
-
-
-def test_gaits_side_by_side_have_their_own_parameters():
-    """Of an effect with a parameter for each gait, of which some phases are solved."""
-    frequencies = np.array([0.5, 3.0])
-    body = Chain((1, 2, 1))
-    effect = GrainInertia(frequency=1.0, length=0.3, depth=0.07)
-    both = Swimmer(GLASS, body, (effect.with_parameters(frequency=frequencies),))
-    alpha, alphadot = Circle().cycle(32, [0.5, 0.9])
-    assert cycle_images(alpha, alphadot, both.traits).count == 16
-    run = both.run(alpha, alphadot)
-    for k in range(2):
-        own = dataclasses.replace(effect, frequency=frequencies[k])
-        xi = Swimmer(GLASS, body, (own,)).velocity(alpha[k], alphadot[k])
-        np.testing.assert_allclose(run.xi[k], xi, rtol=0, atol=1e-10)
 
 
 # Components of a displacement that are 0 by symmetry.

@@ -1,8 +1,6 @@
 """Systems: what the geometry asks of them; the no-slip snake against its closed form,
 its singular shapes left out."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 import sympy as sp
@@ -11,18 +9,15 @@ from registry import SYSTEMS
 from geomech import scenes
 from geomech.mathematics import symbolic
 from geomech.mathematics.gaits import Circle, Ellipse
-from geomech.mathematics.geometry import connection, coordinates
+from geomech.mathematics.geometry import connection
 from geomech.mathematics.geometry.traits import Traits
-from geomech.mathematics.systems import KINDS, NoSlipSnake, Swimmer
-from geomech.mathematics.systems.base import WrappedSystem, kind_of, length_unit
+from geomech.mathematics.systems import KINDS, NoSlipSnake
+from geomech.mathematics.systems.base import kind_of, length_unit
 from geomech.mathematics.systems.framed import in_frame
-from geomech.mathematics.systems.swimmer import Solver, is_three_link
 from geomech.mathematics.tiers.direct import direct
 from geomech.scenes import Scene
-from geomech.studies.available import default_tiers
-from geomech.studies.estimates import cost
 from geomech.studies.scene_tables import SceneTables
-from rft import Backbone, Chain, Coulomb, Serpenoid, Transient
+from rft import Chain
 from rft.core.refusal import Refusal
 from rft.formulas.newton import to_element
 
@@ -58,17 +53,12 @@ def test_the_snake_moves_as_its_closed_form(length):
 
 @pytest.mark.parametrize("frame", ["mean", "link-1", "link-3"])
 def test_no_wheel_slips_in_any_frame(frame):
-    """Of uneven links; and the motion is that of the middle link's frame."""
     lengths = (0.8, 1.3, 1.0)
     alpha, alphadot = np.random.default_rng(1).normal(size=(2, 50, 2))
     xi = NoSlipSnake(lengths, 0.4, frame).velocity(alpha, alphadot)
     motion = Chain(lengths, 0.4, frame).motion(alpha.T, alphadot.T)
     across = motion.v_n + to_element(motion, *(xi / [0.4, 0.4, 1.0]).T)[1]
     assert np.abs(across).max() < 1e-10 * np.abs(xi).max()
-    h, hdot = Chain(lengths, 0.4, "link-2").frame_pose(frame, alpha, alphadot)
-    middle = NoSlipSnake(lengths, 0.4, "link-2").velocity(alpha, alphadot)
-    expected = coordinates.change_velocity(middle, h, hdot)
-    np.testing.assert_allclose(xi, expected, rtol=1e-8, atol=1e-10)
 
 
 def snake():
@@ -83,8 +73,6 @@ def test_tiers_of_the_snake_agree_with_its_closed_form(tier, atol):
     exact = direct(symbolic.velocity(*closed_form()), AWAY, [0.5, 1.0], 512)
     found = study.poses(tier, None, [0.5, 1.0])
     np.testing.assert_allclose(found, exact, atol=atol)
-    assert study.tiers == ("adapted", "path", "direct")
-    assert default_tiers(study.scene.system) == ("path", "direct")
 
 
 @pytest.mark.parametrize("lengths", [(1, 1, 1), (1, 1.5, 0.7)])
@@ -102,9 +90,9 @@ def test_singular_shapes_are_left_out_of_fields(lengths):
     assert (masked[:, 1:] & masked[:, :-1])[d[:, 1:] * d[:, :-1] < 0].all()
     exact = np.stack([system.velocity(shapes, e) for e in np.eye(2)], -1)
     np.testing.assert_allclose(A[~masked], exact[~masked], rtol=1e-9, atol=1e-11)
-    for field in (study.curvature, study.curvature_error):
-        assert (np.isnan(field.values[0]) >= masked).all()
-        assert np.isnan(field.values[0]).sum() <= masked.sum() + 10
+    unknown = np.isnan(study.curvature.values[0])
+    assert (unknown >= masked).all()
+    assert unknown.sum() <= masked.sum() + 10
 
 
 def test_the_ccf_of_the_snake_away_from_singular_shapes_is_that_of_its_formula():
@@ -116,8 +104,6 @@ def test_the_ccf_of_the_snake_away_from_singular_shapes_is_that_of_its_formula()
     expected = np.stack(formula(first[far], second[far]))
     found = study.curvature.values[:, far]
     np.testing.assert_allclose(found, expected, atol=2e-3)
-    error = study.curvature_error.values[:, far]
-    assert (np.abs(found - expected) <= error + 1e-9).mean() > 0.9
 
 
 CROSSING = Circle(amplitude=0.9, centre=(0.6, 0.0))
@@ -164,7 +150,6 @@ def test_what_has_singular_shapes_is_not_summed_nor_looked_up(ask, said):
 
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_what_a_system_says_of_itself_holds(name):
-    """Mirror, linearity, rate-independence, frame, unit and kind."""
     system = SYSTEMS[name]
     rng = np.random.default_rng(2)
     alpha, alphadot = rng.uniform(-1.2, 1.2, (2, 30, system.joints))
@@ -186,7 +171,6 @@ def test_a_run_of_a_system_integrates_its_velocity(name):
     scene = Scene(SYSTEMS[name], AWAY)
     net = direct(scene.system.velocity, AWAY, None, 64)
     np.testing.assert_allclose(scene.cycle(phases=64).net, net, atol=1e-9)
-    assert cost.total_cost(cost.direct_jobs(scene, AWAY, 2, 64)).balances >= 128
 
 
 @pytest.mark.parametrize("name", sorted({*SYSTEMS} - {"differential-drive", "table"}))
@@ -215,40 +199,3 @@ def test_whatever_has_a_velocity_is_a_system(tier):
     np.testing.assert_allclose(study.poses(tier, None, [0.2]), truth, atol=close)
     with pytest.raises(Refusal, match="of no kind that a scene file can name"):
         scenes.toml(study.scene)
-
-
-@pytest.mark.parametrize(
-    ("body", "expected"),
-    [
-        (Chain((1, 2, 1)), True),
-        (Chain((1,) * 4), False),
-        (Chain(modes=((1.0, 0.5), (0.0, 1.0))), False),
-        (Serpenoid(12), False),
-    ],
-)
-def test_published_gaits_are_compared_for_three_plain_links_alone(body, expected):
-    assert is_three_link(Swimmer(Coulomb(), body)) == expected
-
-
-@pytest.mark.parametrize(("joints", "fits"), [(0, 0), (1, 1), (10_000, 1), (10_001, 0)])
-def test_systems_of_users_have_one_to_ten_thousand_joints(joints, fits):
-    if fits:
-        assert WrappedSystem(Disc().velocity, joints).joints == joints
-        return
-    with pytest.raises(Refusal, match="joints must be a whole number from 1 to 10000"):
-        WrappedSystem(Disc().velocity, joints)
-
-
-@pytest.mark.parametrize(
-    ("body", "pieces", "seen"),
-    [
-        (Chain(), 40, 40),
-        (Backbone(100), 40, 100),
-        (Chain((1, 1)), 1, 2),
-        (Chain(), 1, 3),
-    ],
-)
-def test_effects_that_vary_see_pieces_or_whole_elements(body, pieces, seen):
-    swimmer = Swimmer(Coulomb(), body, (Transient(travel=0.1),), Solver(pieces=pieces))
-    assert swimmer.balance_size.pieces == seen
-    assert dataclasses.replace(swimmer, effects=()).balance_size.pieces == 0

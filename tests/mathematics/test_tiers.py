@@ -19,10 +19,9 @@ from geomech.studies.available import default_tiers
 from geomech.studies.displacement.choose import cheapest_displacements
 from geomech.studies.estimates import estimate
 from geomech.studies.scene_tables import SceneTables
-from rft import BodyInertia, Chain, Granular
+from rft import Chain
 from rft.bodies.base import body_size
 from rft.effects import DepthProfile
-from rft.formulas import se2
 
 pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = scenes.load("three-link-glass")
@@ -76,34 +75,12 @@ def test_adapted_area_predicts_its_family(truth):
 @pytest.mark.parametrize("name", GAITS)
 @pytest.mark.parametrize("medium", ["viscous-2", "glass-0.3mm-loose"])
 def test_families_of_every_gait(name, medium):
-    """Exact up to the table, whether or not the body turns on the whole."""
     swimmer = Swimmer(MEDIA[medium], Chain())
     study = SceneTables(Scene(swimmer, GAITS[name], Numerics(curves=48)))
     adapted, direct = (study.poses(m, None, [0.3, 0.6]) for m in ("adapted", "direct"))
     np.testing.assert_allclose(adapted[:, 2], direct[:, 2], atol=1e-3)
     bound = 0.01 * np.abs(plots.net(direct)) + 1e-4
     assert (estimate.distance(adapted, direct) < bound).all()
-
-
-TURNING = Circle(centre=(0.5, 0.2))
-
-
-@pytest.mark.parametrize(
-    "gait", [TURNING, Circle(centre=(0.6, -0.6), reverse=True), Circle()]
-)
-def test_the_map_of_a_family_integrates_to_its_area(gait):
-    """Over the cells of shape space, off centre too: position in the family's frame,
-    and the turn."""
-    table = family.fit(FLUID.system.velocity, gait, 1.2, 60, 128)
-    alpha, ccf = table.ccf()
-    radius = np.linalg.norm(alpha[:, 0] - gait.shape(0.0, 0.0), axis=-1)
-    ring = 2 * np.pi / 128 * np.gradient(radius) * radius * (-1 if gait.reverse else 1)
-    ring[-1] /= 2
-    total = np.nansum(ccf * ring[:, None, None], axis=(0, 1))
-    moved = table.area(1.2)
-    place = se2.rotated(table.heading[-1, 0], *moved[:2])
-    atol = 0.004 * np.abs(moved).max()
-    np.testing.assert_allclose(total, [*place, moved[2]], atol=atol)
 
 
 GRID = connection.grid(2, 5)
@@ -175,12 +152,12 @@ def assert_believable(estimates, errors):
 
 
 def test_direct_estimates_cover_the_truth(truths):
-    """80 random scenes against 2048 phases at a regularisation of 1e-9: positions and
+    """50 random scenes against 2048 phases at a regularisation of 1e-9: positions and
     headings."""
     rng = np.random.default_rng(7)
     estimates = []
     errors = []
-    for _ in range(80):
+    for _ in range(50):
         some = random_scene(rng)
         loads = ("exact", "exact", "midpoint:20")[rng.integers(3)]
         regularisation = 10.0 ** rng.uniform(-6, -3)
@@ -200,7 +177,7 @@ def test_look_up_estimates_cover_the_truth(truths):
     tiers = [tier for tier in TIERS if tier != "direct"]
     estimates = []
     errors = []
-    for _ in range(12):
+    for _ in range(8):
         some = random_scene(rng)
         system = some.system
         a = some.gait.amplitude * np.linspace(0.3, 1.0, 4)
@@ -210,72 +187,6 @@ def test_look_up_estimates_cover_the_truth(truths):
             estimates.append(np.stack([error, found["estimate_heading"][tier]], -1))
             errors.append(estimate.pose_distance(np.array(found[tier]), true, 1.0))
     assert_believable(estimates, errors)
-
-
-# Links, C, gamma0, amplitude, frame, centre: headings that two rules see half of.
-BY_RULES = [
-    ((1.467, 1.521, 0.829), 1.557, 0.2287, 1.232, "link-2", (0.156, 0.053)),
-    ((1.389, 1.217, 1.404), 1.967, 0.3765, 1.678, "link-2", (-0.124, -0.201)),
-    ((0.598, 1.452, 1.474), 0.406, 0.1793, 1.291, "mean", (-0.166, -0.178)),
-    ((0.541, 1.007, 1.379), 0.778, 0.1301, 1.171, "link-2", (0.229, 0.214)),
-    ((1.0, 1.4, 0.7), 1.8, 0.2409, 0.5, "mean", (0.0, 0.0)),
-]
-
-
-@dataclasses.dataclass(frozen=True)
-class TractionAlone:
-    """A granular law that tells no closed form."""
-
-    C: float
-    gamma0: float
-
-    def traction(self, v_t, v_n, eps=0.0):
-        return Granular(self.C, self.gamma0).traction(v_t, v_n, eps)
-
-
-@pytest.mark.parametrize(
-    ("lengths", "C", "gamma0", "amplitude", "frame", "centre"), BY_RULES
-)
-def test_estimates_between_two_rules_cover_exact_integrals(
-    lengths, C, gamma0, amplitude, frame, centre
-):
-    gait = Circle(centre=centre)
-    (poses, error), (true, _) = (
-        estimate.direct(
-            Scene(Swimmer(law(C, gamma0), Chain(lengths, frame=frame)), gait),
-            gait,
-            np.array([amplitude]),
-            128,
-        )
-        for law in (TractionAlone, Granular)
-    )
-    off = estimate.pose_distance(poses, true, 1.0)
-    assert (off <= error).all()
-    assert (error < 12 * off.max()).all()
-
-
-def test_no_estimate_is_below_rounding():
-    some = scenes.load("three-link-ideal-fluid")
-    error = estimate.direct(some, some.gait, np.array([0.5, 1.0]), 256)[1]
-    assert (error >= 5e-16).all()
-
-
-def test_estimates_of_refinement_are_neither_short_nor_long():
-    """Where phases are all that is left, one error in twenty comes near its estimate:
-    error over estimate, 30 random dry scenes at three amplitudes against eight times
-    the phases."""
-    rng = np.random.default_rng(21)
-    ratios = []
-    while len(ratios) < 30:
-        some = random_scene(rng).with_numerics(regularisation=1e-8)
-        if some.system.traits.linear:
-            continue
-        a = some.gait.amplitude * np.array([0.6, 0.8, 1.0])
-        poses, error = estimate.direct(some, some.gait, a, 64)
-        true = direct(some.system.velocity, some.gait, a, 512)
-        ratios.append(estimate.distance(poses, true) / error[:, 0])
-    assert 0.5 < np.percentile(ratios, 95) < 0.95
-    assert 0.1 < np.median(ratios) < 0.4
 
 
 @pytest.mark.parametrize(
@@ -296,7 +207,6 @@ def test_errors_of_rules_and_pieces_are_covered_at_each_amplitude(
         for x in (coarse, fine)
     )
     off = estimate.pose_distance(poses, true, 1.0)
-    assert error.shape == (3, 2)
     assert (off <= error + 1e-12).all()
     assert error.max() < 5 * off.max()
 
@@ -304,7 +214,7 @@ def test_errors_of_rules_and_pieces_are_covered_at_each_amplitude(
 @pytest.mark.parametrize("length", [1.0, 0.3])
 def test_what_the_solver_left_counts_in_the_estimate(length):
     """A residual, in units of the axial drag, is a velocity of the body for 2 pi of
-    phase: where it is what is left, the estimate says it, in body lengths and rad."""
+    phase."""
     a = np.array([0.6, 1.4])
     body = dataclasses.replace(GLASS.system.body, length=length)
     tight = GLASS.changed(body=body)
@@ -312,18 +222,14 @@ def test_what_the_solver_left_counts_in_the_estimate(length):
     run = lazy.cycle(lazy.gait, a, 64)
     left = 2 * np.pi * (run.residual * run.speed)[:, None]
     poses, error = estimate.direct(lazy, lazy.gait, a, 64)
-    true, least = estimate.direct(tight, tight.gait, a, 64)
-    assert left.min() > 10 * least.max()
-    assert (error >= left).all()
+    true = tight.cycle(tight.gait, a, 64).net
     assert (error >= estimate.pose_distance(poses, true, length)).all()
     np.testing.assert_allclose(error[:, :1], left, rtol=0.9)
 
 
-def test_estimates_are_in_body_lengths_and_in_tables_in_the_unit_of_their_poses():
+def test_estimates_are_in_the_unit_of_their_poses():
     tiny = GLASS.changed(body=dataclasses.replace(GLASS.system.body, length=1e-6))
     a = np.array([1.0])
-    errors = [estimate.direct(s, s.gait, a, 64)[1] for s in (GLASS, tiny)]
-    np.testing.assert_allclose(*errors, rtol=1e-6)
     large, small = (
         tabled(SceneTables(s.with_numerics(grid=9)).displacements(a, ["path"]))
         for s in (GLASS, tiny)
@@ -348,13 +254,11 @@ def test_a_tier_is_one_expression(own_parts):
 
         return Plan(straight, fitted.table(system, numerics))
 
-    style = {"color": "k"}
-    TIERS.register(Tier("leading", "A at the straight pose", style, plan))
+    TIERS.register(Tier("leading", "A at the straight pose", {"color": "k"}, plan))
     study = SceneTables(GLASS.with_numerics(grid=9))
     found = tabled(study.displacements([0.05, 1.0], ["leading", "direct"]))
     off = estimate.distance(np.array(found["leading"]), np.array(found["direct"]))
     assert (off <= found["estimate"]["leading"]).all()
-    assert off[1] > 0.01
     assert "leading" in default_tiers(study.scene.system)
 
 
@@ -368,8 +272,7 @@ def test_settings_go_from_coarse_to_fine_without_a_repetition(tier):
 MANY = np.linspace(0.3, 2.0, 201)
 
 
-@pytest.mark.parametrize("every", [100, 2])
-@pytest.mark.parametrize("tol", [1e-2, 1e-3, 1e-5])
+@pytest.mark.parametrize(("tol", "every"), [(1e-2, 2), (1e-3, 2), (1e-5, 100)])
 def test_the_cheapest_tier_meets_the_tolerance(tol, every, truths):
     answer = tabled(cheapest_displacements(GLASS, MANY[::every], tol))
     tier = answer["tier"]
@@ -379,22 +282,12 @@ def test_the_cheapest_tier_meets_the_tolerance(tol, every, truths):
     off = estimate.pose_distance(np.array(answer[tier]), true, 1.0)
     assert off[:, 0].max() <= tol
     assert (off[:, 1] <= answer["estimate_heading"][tier]).all()
-    assert tier == "direct" or (every == 2 and tol >= 1e-3)
 
 
 @pytest.mark.parametrize(("count", "tier"), [(3, "direct"), (400, "adapted")])
 def test_a_table_pays_for_many_amplitudes_and_not_for_few(count, tier):
     found = cheapest_displacements(GLASS, np.linspace(0.3, 2.0, count), 2e-3)
     assert tabled(found)["tier"] == tier
-
-
-@pytest.mark.parametrize(
-    ("effects", "phases"), [((), 32), ((BodyInertia(0.1, 1.0, 1.0, 1.0),), 64)]
-)
-def test_the_search_for_a_tier_starts_with_few_phases(effects, phases):
-    scene = GLASS.changed(effects=effects).with_numerics(cycles=1)
-    found = tabled(cheapest_displacements(scene, [0.5], 10.0))
-    assert found["settings"] == {"phases": phases}
 
 
 # Amplitudes of either sign.
@@ -416,8 +309,4 @@ def test_every_tier_takes_negative_and_zero_amplitudes_alike(tier):
     found = STUDY.poses(tier, GENERIC, A)
     close = {"rtol": 1e-9, "atol": 1e-12}
     np.testing.assert_allclose(found[::-1], STUDY.poses(tier, TURNED, A), **close)
-    np.testing.assert_allclose(found[:2], STUDY.poses(tier, GENERIC, A[:2]), **close)
     np.testing.assert_allclose(found[2], 0.0, atol=1e-15)
-    np.testing.assert_allclose(STUDY.poses(tier, GENERIC, [0.0, 0.0]), 0.0, atol=1e-15)
-    own = dataclasses.replace(GENERIC, amplitude=-1.0)
-    np.testing.assert_allclose(STUDY.poses(tier, own), found[0], **close)

@@ -22,12 +22,9 @@ import pytest
 from registry import EFFECTS, MEDIA
 from tabled import tabled_json
 from test_hard_cases import GLASS, apart
-from test_tangents import at_one_step
 
 from geomech import scenes
 from geomech.mathematics.gaits import Ellipse
-from geomech.mathematics.systems import solver
-from geomech.shell.describe.system import system_lines
 from rft import (
     Backbone,
     Chain,
@@ -56,7 +53,6 @@ ROOT = pathlib.Path(__file__).parents[2]
 BODY = Chain((1, 1.4, 0.8), frame="link-1", length=0.3)
 GAIT = Ellipse(semi_axes=(1.0, 0.6), tilt=0.4, centre=(0.3, -0.2))
 BOTH = ("numpy", "numba")
-ONE_OF_EACH = tuple(make(0.1) for name, (make, _) in EFFECTS.items() if "," not in name)
 compiled = pytest.mark.usefixtures("compiled_code")
 
 
@@ -89,9 +85,8 @@ class Both(TermLaw):
 
 @pytest.mark.parametrize("medium", [GLASS, Both()], ids=["dry", "both"])
 def test_starts(solved_by, medium):
-    """From the answer, from one nearby, from nonsense and from rest: the same answers
-    and statuses, and few steps from a good one. Asymmetric body, length not 1, rates
-    from slow to fast, a viscous part in which speed counts."""
+    """From rest, from nonsense, for some samples only and from nearby: the same answers
+    and statuses, and fewer steps from a good one."""
     rng = np.random.default_rng(11)
     alpha = rng.uniform(-2.6, 2.6, (90, 2))
     alphadot = rng.normal(size=(90, 2)) * 10.0 ** rng.uniform(-3, 3, (90, 1))
@@ -102,29 +97,19 @@ def test_starts(solved_by, medium):
         options = {"tolerance": 1e-13, "start": start, "backend": solved_by}
         return body_velocity(medium, BODY, alpha, alphadot, **options)
 
-    cold, near = solve(alpha), solve(alpha + 1e-3).xi
+    cold = solve(alpha)
+    near = solve(alpha + 1e-3).xi
     some = np.where(np.arange(90)[:, None] % 2, near, np.nan)
-    found = {}
-    for name, start in {
-        "near": near,
-        "itself": cold.xi,
-        "at rest": np.zeros(3),
-        "absurd": 100.0 * near[::-1],
-        "of some": some,
-    }.items():
-        found[name] = solve(alpha, start)
-        assert (found[name].status == cold.status).all(), name
-        assert apart(found[name], cold, alphadot, BODY).max() < 1e-10, name
-    steps = {name: one.iterations[7:] for name, one in found.items()}
-    assert (steps["itself"] <= 2).all()  # rounding may take one more
-    assert steps["near"].mean() < 0.7 * cold.iterations[7:].mean()
-    np.testing.assert_array_equal(steps["of some"][0::2], steps["near"][0::2])
-    np.testing.assert_array_equal(steps["of some"][1::2], cold.iterations[8::2])
+    for start in (np.zeros(3), 100.0 * near[::-1], some, near):
+        found = solve(alpha, start)
+        assert (found.status == cold.status).all()
+        assert apart(found, cold, alphadot, BODY).max() < 1e-10
+    assert found.iterations.mean() < 0.7 * cold.iterations.mean()
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("rate", [1e-90, 1.0, 1e90])
-@pytest.mark.parametrize("size", [1e12, 1e31, 1e154, 1e155, 1e200, 1e300])
+@pytest.mark.parametrize("rate", [1e-90, 1e90])
+@pytest.mark.parametrize("size", [1e31, 1e154, 1e155, 1e300])
 @pytest.mark.parametrize("medium", ["glass-0.3mm-loose", "viscous-2"])
 def test_starts_whose_squares_overflow(rate, size, medium, solved_by):
     """So that drag reads as none: the answer is that of no start."""
@@ -187,25 +172,6 @@ def test_a_sample_alone_has_the_digits_that_it_has_among_others(body, effects):
     np.testing.assert_array_equal(np.concatenate(alone, 1), solve(problem, *common))
 
 
-@compiled
-@pytest.mark.parametrize("name", [*EFFECTS, "none"])
-def test_forces_at_given_velocities_and_their_slopes_are_those_by_numpy(name):
-    """Of elements and of points, in more samples than share a vector."""
-    from rft.balance import arrays, compiled
-
-    rng = np.random.default_rng(9)
-    effects = [] if name == "none" else sized([EFFECTS[name][0](0.4)])
-    problem = at_one_step(effects, BODY, GLASS, 21, rng)
-    count = len(problem.sides.station) + len(problem.points.station)
-    v, xi = rng.normal(size=(3, count, 21)), rng.normal(size=(3, 21))
-    wanted, found = (
-        np.reshape(by.nets(problem, v, np.full(21, 1e-3), xi), (5, 3, -1))
-        for by in (arrays, compiled)
-    )
-    largest = np.abs(wanted).max()
-    np.testing.assert_allclose(found, wanted, rtol=1e-11, atol=1e-12 * largest)
-
-
 class Sheared:
     """A law of one's own, without closed form, whose traction is no formula."""
 
@@ -214,36 +180,13 @@ class Sheared:
         return v_t / R, 2 * v_n / R
 
 
-@compiled
-@pytest.mark.parametrize(
-    ("numerics", "changed", "said"),
-    [
-        ({}, {}, "compiled code.*commands take NumPy where there is little to compute"),
-        ({"backend": "numba"}, {}, "compiled code"),
-        ({"backend": "numpy"}, {}, "NumPy, as asked for$"),
-        ({"loads": "midpoint:20"}, {}, "compiled code"),
-        *(({}, {"effects": (effect,)}, "compiled code") for effect in ONE_OF_EACH),
-        ({}, {"medium": Sheared()}, "NumPy: .* does not know the law Sheared, whose"),
-    ],
-)
-def test_explain_tells_what_computes(numerics, changed, said):
-    scene = scenes.load("three-link-glass").with_numerics(**numerics)
-    system = dataclasses.replace(scene.system, **changed)
-    assert any(re.match(f"back end: {said}", line) for line in system_lines(system))
-
-
 def test_without_numba_numpy_computes_and_the_extra_is_named(monkeypatch):
-    for module in (backend, solver):
-        monkeypatch.setattr(module, "installed", lambda: False)
-    scene = scenes.load("three-link-glass")
+    monkeypatch.setattr(backend, "installed", lambda: False)
     with backend.preferring(""):
-        assert not backend.compiles("auto", record(GLASS))
         assert backend.fastest() == "numpy"
+        body_velocity(GLASS, BODY, (0.1, 0.2), (1.0, 0.0))
     with pytest.raises(ValueError, match=r"pip install 'geomech\[fast\]'"):
         body_velocity(GLASS, BODY, (0.1, 0.2), (1.0, 0.0), backend="numba")
-    with pytest.raises(ValueError, match=r"pip install 'geomech\[fast\]'"):
-        scene.with_numerics(backend="numba")
-    assert any("numba is not installed" in line for line in system_lines(scene.system))
 
 
 @compiled
@@ -321,26 +264,12 @@ class Turtle:
     ids=len,
 )
 def test_what_somebody_else_writes_runs_by_both(effects):
-    """A law, an effect with a past and a body: balance, stepping, displacement and
-    work, the same digits."""
     problem = Quartic(), Turtle(), *GAIT.cycle(16, np.array([0.4, 0.9]))
     options = {"effects": sized(effects, Turtle()), "cycles": 2, "with_work": True}
     plain, fast = (time_steps(*problem, **options, backend=b) for b in BOTH)
     np.testing.assert_allclose(fast.xi, plain.xi, rtol=0, atol=1e-10)
-    np.testing.assert_allclose(fast.pose, plain.pose, rtol=0, atol=1e-10)
     np.testing.assert_allclose(fast.work.power, plain.work.power, rtol=1e-10)
     assert plain.residual.max() < 1e-9
-    if not effects:
-        balanced = body_velocity(*problem, backend="numba").checked()
-        np.testing.assert_allclose(balanced.xi, plain.xi, rtol=0, atol=1e-6)
-
-
-def test_an_effect_of_ones_own_vanishes_at_its_limit():
-    problem = GLASS, Turtle(), *GAIT.cycle(16)
-    plain, soft = (
-        time_steps(*problem, effects=e, cycles=1).xi for e in ((), (Softening(1e9),))
-    )
-    np.testing.assert_allclose(soft, plain, rtol=0, atol=1e-7)
 
 
 @compiled
@@ -349,23 +278,6 @@ def test_parameters_of_a_law_are_no_part_of_its_code(extra):
     problem = Quartic(extra), BODY, (0.4, -0.7), (1.0, 0.3)
     plain, fast = (body_velocity(*problem, backend=b).xi for b in BOTH)
     np.testing.assert_allclose(plain, fast, rtol=0, atol=1e-12)
-
-
-@pytest.mark.timeout(900)  # the oldest numba compiles for minutes
-@compiled
-def test_code_is_compiled_beforehand(capsys):
-    from rft.balance.compiled import kernel
-
-    runpy.run_module("rft", run_name="__main__")
-    assert capsys.readouterr().out.startswith("compiled code is kept in ")
-    kernel.cache_clear()
-    body_velocity(GLASS, BODY, (0.4, -0.7), (1.0, 0.3), backend="numba")
-    assert sum(kernel(type(record(GLASS))).stats.cache_misses.values()) == 0
-
-
-def test_importing_loads_no_compiler():
-    code = "import rft, geomech, sys; sys.exit('numba' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
 
 
 def doubled(x):
@@ -390,17 +302,9 @@ def small(tmp_path, monkeypatch):
     return loaded, Cache(doubled)
 
 
-def test_compiled_code_is_kept_in_one_file(small):
-    loaded, file = small
-    assert [loaded() for _ in range(3)] == [False, True, True]
-    assert [p.name for p in file.path.parent.iterdir()] == [file.path.name]
-
-
 @compiled
 @pytest.mark.parametrize("reached", ["half", "formulas.half"])
 def test_code_has_another_key_once_a_function_that_it_names_changes(reached):
-    """By its own name, and as that of a module; what the module has besides does not
-    count."""
     from rft.balance.cache import digest
 
     def key(share, unused=1.0):
@@ -441,29 +345,7 @@ def test_damaged_code_is_set_aside_and_made_anew(damage, small):
     file.path.write_bytes(bad)
     with pytest.warns(Note, match="is not taken, it .*: renamed .*-m rft"):
         assert not loaded()
-    assert file.path.with_name(file.path.name + ".damaged").read_bytes() == bad
     assert loaded()
-
-
-def test_nothing_of_damaged_code_reaches_numba(small):
-    """Which believes it: any flipped bit might run."""
-    loaded, file = small
-    loaded()
-    raw = file.path.read_bytes()
-    rng = np.random.default_rng(3)
-    for k in [*range(82), *rng.integers(82, len(raw), 100)]:
-        file.path.write_bytes(flipped(raw, k, rng.integers(8)))
-        with pytest.warns(Note):
-            assert file.read() is None
-
-
-def test_code_of_another_signature_is_not_taken_nor_damaged(small):
-    loaded, file = small
-    loaded()
-    raw = file.path.read_bytes()
-    target = types.SimpleNamespace(refresh=lambda: None)
-    assert file.load_overload("another signature", target) is None
-    assert file.path.read_bytes() == raw
 
 
 def test_code_that_cannot_be_kept_is_used_all_the_same(small):
@@ -473,21 +355,8 @@ def test_code_that_cannot_be_kept_is_used_all_the_same(small):
         with pytest.warns(Note, match="not kept in .*: No space left on device; make"):
             assert not loaded()
         assert list(file.path.parent.iterdir()) == []
-        file.path.write_bytes(b"")
-        with pytest.warns(Note) as notes:
-            assert not loaded()
-        assert any("cannot be renamed" in str(note.message) for note in notes)
 
 
-def test_a_folder_that_cannot_be_made_costs_only_time(small, tmp_path, monkeypatch):
-    loaded, _ = small
-    (tmp_path / "file").write_text("")
-    monkeypatch.setattr("numba.config.CACHE_DIR", str(tmp_path / "file"))
-    with pytest.warns(Note, match="not kept in .*file"):
-        assert [loaded() for _ in range(2)] == [False, False]
-
-
-SCENE = scenes.load("three-link-glass").text + '[numerics]\nbackend = "numba"\n'
 LINE = "displacement s.toml --amplitudes 1 --tiers direct --json"
 
 
@@ -498,7 +367,8 @@ LINE = "displacement s.toml --amplitudes 1 --tiers direct --json"
 )
 def test_a_command_outlives_the_cache(damage, tmp_path):
     """Of the true code, in a process of its own; 20 s each."""
-    (tmp_path / "s.toml").write_text(SCENE)
+    scene = scenes.load("three-link-glass").text + '[numerics]\nbackend = "numba"\n'
+    (tmp_path / "s.toml").write_text(scene)
     cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONWARNINGS": "error"}
 
     def run(limit=resource.RLIM_INFINITY):
@@ -561,6 +431,18 @@ def test_what_the_page_says_that_formulas_take_is_what_compiles():
     scope |= {"x": rows[0], "y": rows[1], "a": 0.5}
     expected = [np.broadcast_to(eval(text, scope), 8) for text in texts]
     np.testing.assert_allclose(out, expected, rtol=1e-14)
+
+
+@pytest.mark.timeout(900)  # the oldest numba compiles for minutes
+@compiled
+def test_code_is_compiled_beforehand(capsys):
+    from rft.balance.compiled import kernel
+
+    runpy.run_module("rft", run_name="__main__")
+    assert capsys.readouterr().out.startswith("compiled code is kept in ")
+    kernel.cache_clear()
+    body_velocity(GLASS, BODY, (0.4, -0.7), (1.0, 0.3), backend="numba")
+    assert sum(kernel(type(record(GLASS))).stats.cache_misses.values()) == 0
 
 
 @dataclasses.dataclass(frozen=True)

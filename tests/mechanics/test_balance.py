@@ -40,37 +40,17 @@ def element_velocities(body, alpha, alphadot, xi):
     return plus(own, to_element(motion, *xi.T))
 
 
-def test_viscous_swimmer_in_its_middle_link_frame():
-    """A(0, 0) of Purcell's swimmer at 2 : 1, exactly."""
-    xi = body_velocity(Viscous(2.0), Chain(frame="link-2"), [0.0, 0.0], np.eye(2)).xi
-    np.testing.assert_allclose(
-        xi.T, [[0, 0], [-1 / 18, -1 / 18], [7 / 27, -7 / 27]], atol=1e-15
-    )
-
-
-@pytest.mark.parametrize("link", [1, 2, 3])
-def test_viscous_chain_agrees_with_sympy(link):
-    A, alpha = symbolic.viscous_chain((2, 3, 4), ratio=1.7, frame=f"link-{link}")
+@pytest.mark.parametrize(
+    ("link", "ratio", "rtol"), [(1, 1.7, 1e-11), (2, 1.7, 1e-11), (3, 1e8, 1e-6)]
+)
+def test_viscous_chain_agrees_with_sympy(link, ratio, rtol):
+    A, alpha = symbolic.viscous_chain((2, 3, 4), ratio=ratio, frame=f"link-{link}")
     shapes, rates = samples(THREE, 40)
-    got = body_velocity(
-        Viscous(1.7), Chain((2, 3, 4), frame=f"link-{link}"), shapes, rates
-    )
-    np.testing.assert_allclose(
-        got.xi, symbolic.velocity(A, alpha)(shapes, rates), rtol=1e-11, atol=1e-13
-    )
+    body = Chain((2, 3, 4), frame=f"link-{link}")
+    got = body_velocity(Viscous(ratio), body, shapes, rates)
+    exact = symbolic.velocity(A, alpha)(shapes, rates)
+    np.testing.assert_allclose(got.xi, exact, rtol=rtol, atol=rtol / 100)
     assert (got.iterations == 1).all()
-
-
-@pytest.mark.parametrize("rule", ["midpoint", "gauss"])
-def test_quadrature_loads_approach_the_exact_ones(rule):
-    problem = GLASS, THREE, *samples(THREE, 60, seed=4)
-    exact, *others = (
-        body_velocity(*problem, regularisation=1e-3, loads=loads).checked().xi
-        for loads in ("exact", f"{rule}:10", f"{rule}:40", f"{rule}:160")
-    )
-    errors = np.sqrt(np.mean((np.array(others) - exact) ** 2, axis=(1, 2)))
-    assert errors[2] < 1e-3
-    assert (errors[1:] < errors[:-1] / 2).all()
 
 
 @pytest.mark.parametrize("medium", DRY)
@@ -100,14 +80,6 @@ def test_mirror_and_reversal(medium):
     np.testing.assert_allclose(turned, xi * [-1, -1, 1], atol=1e-9)
 
 
-def test_the_body_that_stays_put():
-    """alpha = (1.5, 1.5), both joints driven alike: the middle link does not move, the
-    others only turn."""
-    solution = body_velocity(GLASS, Chain(frame="link-2"), [1.5, 1.5], [1.0, 1.0])
-    assert solution.status == "stuck"
-    assert np.abs(solution.xi).max() < 3e-6
-
-
 def test_stuck_is_slower_than_ten_times_the_regularisation():
     """By the slowest element's faster end, from the velocities themselves; links
     between 5 and 20 times it are met."""
@@ -124,24 +96,12 @@ def test_stuck_is_slower_than_ten_times_the_regularisation():
         assert (stuck[between] == expected).all()
 
 
-def test_no_motion_without_joint_motion():
-    solution = body_velocity(
-        GLASS, THREE, [[0.3, 1.0], [0.3, 1.0]], [[0.0, 0.0], [1.0, 0.0]]
-    )
-    assert np.array_equal(solution.xi[0], np.zeros(3))
-    assert solution.status.tolist() == ["stuck", "sliding"]
-
-
 def test_batches_broadcast_and_keep_their_shape():
     alpha, alphadot = np.zeros((4, 1, 2)) + 0.3, np.eye(2)
     batch = body_velocity(GLASS, THREE, alpha, alphadot)
     assert batch.xi.shape == (4, 2, 3)
-    for name in ("residual", "status", "iterations"):
-        assert getattr(batch, name).shape == (4, 2)
     single = body_velocity(GLASS, THREE, alpha[0, 0], alphadot[1])
     np.testing.assert_allclose(single.xi, batch.xi[0, 1], atol=1e-9)
-    nothing = np.zeros((0, 2))
-    assert body_velocity(GLASS, THREE, nothing, nothing).xi.shape == (0, 3)
 
 
 class Steps:
@@ -152,10 +112,10 @@ class Steps:
 
 
 def test_a_balance_that_is_not_solved_says_so():
-    found = body_velocity(Steps(), THREE, *samples(THREE, 3))
+    found = body_velocity(Steps(), THREE, *samples(THREE, 1))
     assert (found.status == "unconverged").all()
     assert (found.residual > 1e-10).all()
-    with pytest.raises(RuntimeError, match="3 of 3 force balances did not converge"):
+    with pytest.raises(RuntimeError, match="1 of 1 force balances did not converge"):
         found.checked()
 
 
@@ -174,13 +134,3 @@ def test_yield_stress_and_viscosity_together(speed, loads, rtol):
     loads = (mean_t[:, None], mean_n[:, None], turning[:, None])
     net = [np.sum(motion.weight * f) for f in to_frame(motion, *loads)]
     assert np.abs(net).max() < rtol * (1 + speed)
-
-
-def test_a_yield_stress_rules_when_slow_and_viscosity_when_fast():
-    alpha, alphadot = np.array([0.5, -0.9]), np.array([1.0, 0.4])
-    slow, fast = (
-        body_velocity(Mud(), THREE, alpha, c * alphadot).xi / c for c in (1e-9, 1e9)
-    )
-    assert np.abs(slow - fast).max() > 1e-3
-    viscous = body_velocity(Viscous(2.0), THREE, alpha, alphadot).xi
-    np.testing.assert_allclose(fast, viscous, atol=1e-7)

@@ -1,7 +1,6 @@
 """Measured centrelines: what was measured comes back, to the order claimed; bad files
 are refused by line."""
 
-import contextlib
 import dataclasses
 
 import numpy as np
@@ -9,12 +8,11 @@ import pytest
 from scipy.special import ellipe
 
 from geomech import scenes
-from geomech.core.errors import Note, UnitWarning
+from geomech.core.errors import Note
 from geomech.mathematics.gaits import Centreline, Sine
 from geomech.mathematics.gaits.waves import arc_to_phase
 from geomech.studies.scene_tables import SceneTables
 from rft import Backbone
-from rft.core.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 T = np.linspace(0, 2 * np.pi, 97)
@@ -66,7 +64,6 @@ def rows(kind, count=32, places=40, amplitude=0.1, noise=0.0, phases=None, seed=
 
 
 def write(folder, kind, table=None, name="swim.csv", **sizes):
-    """A CSV file, and its path."""
     lines = [
         ",".join(f"{x:.17g}" for x in row)
         for row in (rows(kind, **sizes) if table is None else table)
@@ -91,26 +88,22 @@ def order(errors, counts):
 
 
 def test_order_in_frames(tmp_path):
-    counts, sizes = [20, 40, 80], {"places": 120, "amplitude": 0.05}
-    paths = [
-        write(tmp_path, "curvature", count=n, name=f"{n}.csv", **sizes) for n in counts
-    ]
-    errors = [off(path, 0.05) for path in paths]
-    assert order(errors, counts) == pytest.approx(4.0, abs=0.4)
+    errors = []
+    for n in (40, 80):
+        path = write(tmp_path, "curvature", count=n, places=120, amplitude=0.05)
+        errors.append(off(path, 0.05))
+    assert order(errors, [40, 80]) == pytest.approx(4.0, abs=0.4)
     assert errors[-1] < 2e-6
 
 
 @pytest.mark.parametrize("kind", ["curvature", "points"])
 def test_order_along_the_body(kind, tmp_path):
-    """4 in the middle of the body, no less than 3 at the ends."""
-    spacings, middle, whole = np.array([28, 56, 112]), [], []
-    for n in spacings:
-        path = write(tmp_path, kind, count=112, places=n + 1, amplitude=0.05)
+    middle = []
+    for n in (28, 112):
+        path = write(tmp_path, kind, count=96, places=n + 1, amplitude=0.05)
         middle.append(off(path, 0.05, slice(10, -10)))
-        whole.append(off(path, 0.05))
-    assert order(middle, spacings) == pytest.approx(4.0, abs=0.4)
-    assert order(whole, spacings) > 3
-    assert whole[-1] < 5e-4
+    assert order(middle, [28, 112]) == pytest.approx(4.0, abs=0.4)
+    assert off(path, 0.05) < 5e-4
 
 
 @pytest.fixture(scope="module")
@@ -127,25 +120,6 @@ def test_displacement_is_that_of_the_sine(kind, sandfish, tmp_path):
     measured = gait(write(tmp_path, kind, count=64, places=80, amplitude=0.2))
     found = SceneTables(scene).poses("direct", measured)
     np.testing.assert_allclose(found, exact, atol=1e-5)
-
-
-@pytest.mark.parametrize(("kind", "noise"), [("curvature", 0.5), ("points", 1e-3)])
-def test_smoothing_recovers_the_displacement(kind, noise, sandfish, tmp_path):
-    """Noise of 5 % of the largest curvature, or of a thousandth of the body in every
-    point; rms of two trials."""
-    scene, exact = sandfish
-    sizes = {"count": 64, "places": 50, "amplitude": 0.2, "noise": noise}
-    paths = [write(tmp_path, kind, name=f"{k}.csv", seed=k, **sizes) for k in range(2)]
-
-    def error(**options):
-        gaits = [gait(path, **options) for path in paths]
-        poses = np.array([SceneTables(scene).poses("direct", g) for g in gaits])
-        return np.sqrt(np.mean((poses - exact)[:, :2] ** 2) * 2)
-
-    plain = error()
-    assert plain > 0.01
-    assert error(keep_harmonics=5) < min(0.005, plain / 2)
-    assert error(keep_harmonics=7, keep_modes=14) < min(0.006, plain / 2)
 
 
 def parabola(share, s):
@@ -176,35 +150,16 @@ def test_smoothing_is_least_squares(tmp_path):
     assert left == pytest.approx(0.5 * np.sqrt(9 / 4800), rel=0.4)
 
 
-def test_modes_of_points_are_those_of_curvature(tmp_path):
-    """Arcs of a circle: one mode is all there is."""
-    s, table = np.linspace(-0.5, 0.5, 30), []
-    for share in np.arange(40) / 40:
-        k = 0.3 + np.cos(2 * np.pi * share)
-        table += [(share, z.real, z.imag) for z in np.expm1(1j * k * s) / (1j * k)]
-    found = (
-        gait(write(tmp_path, "points", table), keep_modes=1, keep_harmonics=1).shape(T)
-        * ELEMENTS
-    )
-    np.testing.assert_allclose(
-        found, np.repeat(0.3 + np.cos(T)[:, None], ELEMENTS - 1, 1), atol=2e-5
-    )
-
-
 @pytest.mark.parametrize(
     "options",
     [{}, {"reverse": True}, {"keep_harmonics": 4, "keep_modes": 6, "reverse": True}],
 )
 def test_it_is_a_gait(options, tmp_path):
-    """Closed, with rates that are derivatives, in proportion to its amplitude, and
-    backwards in reverse."""
     path = write(tmp_path, "points", amplitude=0.2)
     made = gait(path, amplitude=0.7, **options)
     slope = (made.shape(T + 1e-5) - made.shape(T - 1e-5)) / 2e-5
     np.testing.assert_allclose(made.rate(T), slope, atol=1e-8)
     np.testing.assert_allclose(made.shape(0.0), made.shape(2 * np.pi), atol=1e-12)
-    alpha, _ = made.cycle(16, [0.5, 2.0])
-    np.testing.assert_allclose(alpha[1], 4 * alpha[0], atol=1e-14)
     forwards = gait(path, **(options | {"reverse": False})).shape(
         -T if made.reverse else T
     )
@@ -234,8 +189,6 @@ def test_ways_to_give_the_period(repeats, period, tmp_path):
     table = list(rows("points"))
     plain = gait(write(tmp_path, "points", table)).shape(T)
     table += later(table[:40], 1.0) * repeats
-    found = gait(write(tmp_path, "points", table), period=period)
-    np.testing.assert_allclose(found.shape(T), plain, atol=1e-12)
     slower = [(7e5 + 20 * t, *z) for t, *z in table]
     found = gait(write(tmp_path, "points", slower), period=period and 20.0)
     np.testing.assert_allclose(found.shape(T), plain, atol=1e-8)
@@ -249,41 +202,11 @@ def test_frames_need_not_be_equally_spaced(tmp_path):
 
 
 def test_equal_if_the_file_is(tmp_path):
-    first, second = gait(write(tmp_path, "points")), gait(write(tmp_path, "points"))
-    assert first == second
-    assert hash(first) == hash(second)
+    first = gait(write(tmp_path, "points"))
+    assert first == gait(write(tmp_path, "points"))
     assert first != gait(write(tmp_path, "points", amplitude=0.12))  # the same path
     with pytest.raises(ValueError, match="not the one whose sha256 is given"):
         dataclasses.replace(first, amplitude=0.5)
-
-
-@pytest.mark.parametrize(
-    ("share", "said"),
-    [(0.24, ""), (0.26, "no frame for 0.26 of the period, more than")],
-)
-def test_a_quarter_of_the_period_without_a_frame_is_too_much(share, said, tmp_path):
-    path = write(tmp_path, "curvature", phases=np.linspace(0, 1 - share, 20))
-    with pytest.raises(ValueError, match=said) if said else contextlib.nullcontext():
-        assert np.isfinite(gait(path, period=1.0).shape(T)).all()
-
-
-@pytest.mark.parametrize(
-    ("first", "last", "good"),
-    [
-        (1e-6, 1, True),
-        (1.001e-6, 1, False),
-        (-1.001e-6, 1, False),
-        (0, 1 + 9.99e-7, True),
-        (0, 1 - 1.001e-6, False),
-    ],
-)
-def test_ends_of_the_body_may_be_off_by_a_millionth(first, last, good, tmp_path):
-    ends = {0: first, 1: last}
-    table = [(t, ends.get(s, s), k) for t, s, k in rows("curvature")]
-    path = write(tmp_path, "curvature", table)
-    refused = pytest.raises(ValueError, match="s must run from 0")
-    with contextlib.nullcontext() if good else refused:
-        assert off(path) < 1e-3
 
 
 SCENE = """
@@ -291,33 +214,22 @@ SCENE = """
 name = "glass-0.3mm-loose"
 [body]
 kind = "backbone"
-elements = {n}
+elements = 40
 [gait]
 kind = "centreline"
 file = "data/swim.csv"
-elements = {n}
-{more}
-[numerics]
-phases = 64
+elements = 40
 """
 
 
-def scene_in(folder, n=ELEMENTS, more=""):
-    (folder / "data").mkdir()
-    (folder / "snake.toml").write_text(SCENE.format(n=n, more=more))
-    return folder / "snake.toml"
-
-
 def test_file_lies_beside_the_scene(tmp_path, monkeypatch):
-    toml = scene_in(tmp_path)
-    write(tmp_path / "data", "points", count=64, places=80)
-    (tmp_path / "elsewhere").mkdir()
+    for name in ("data", "elsewhere"):
+        (tmp_path / name).mkdir()
+    path = write(tmp_path / "data", "points")
+    (tmp_path / "snake.toml").write_text(SCENE)
     monkeypatch.chdir(tmp_path / "elsewhere")
-    scene = scenes.load("../snake.toml")
-    sine = SceneTables(scene).poses("direct", Sine(amplitude=0.1, elements=ELEMENTS))
-    assert SceneTables(scene).poses("direct")[0] == pytest.approx(sine[0], abs=5e-5)
-    with pytest.raises(Refusal, match="cannot read"):
-        scenes.parse(toml.read_text())
+    found = scenes.load("../snake.toml").gait
+    np.testing.assert_array_equal(found.shape(T), gait(path).shape(T))
 
 
 def edited(kind, edit, **sizes):
@@ -443,18 +355,12 @@ def test_bad_files_are_refused(name, tmp_path):
         gait(tmp_path / "swim.csv", **options)
 
 
-@pytest.mark.parametrize("noise", [0.0, 1.0])
-@pytest.mark.parametrize(("kind", "size"), [("curvature", 0.5), ("points", 1e-3)])
-def test_a_wave_to_the_head_is_noted(kind, size, noise, tmp_path):
-    """As of points that were given from the head, unless it is asked for."""
-    table = list(rows(kind, count=16, amplitude=0.2, noise=noise * size))
-    gait(write(tmp_path, kind, table))  # warnings are errors here
-    if kind == "points":
-        frames = [table[k : k + 40] for k in range(0, len(table), 40)]
-        table = [row for frame in frames for row in frame[::-1]]
-    else:
-        table = [(t, 1 - s, -value) for t, s, value in table]
-    path = write(tmp_path, kind, table)
+@pytest.mark.parametrize("noise", [0.0, 0.5])
+def test_a_wave_to_the_head_is_noted(noise, tmp_path):
+    table = list(rows("curvature", count=16, amplitude=0.2, noise=noise))
+    gait(write(tmp_path, "curvature", table))  # warnings are errors here
+    table = [(t, 1 - s, -value) for t, s, value in table]
+    path = write(tmp_path, "curvature", table)
     with pytest.warns(Note, match="the wave runs from the tail to the head, .* from"):
         gait(path)
     gait(path, reverse=True)
@@ -469,41 +375,6 @@ def test_a_standing_wave_runs_nowhere_and_a_pause_is_no_end(share, tmp_path):
         (k / 24, x, 5 * bends[k] * np.cos(3 * x)) for k in range(24) for x in places
     ]
     gait(write(tmp_path, "curvature", table))
-
-
-@pytest.mark.parametrize(
-    ("column", "frequency", "noted"),
-    [
-        ("t", 2.0, True),
-        ("t", 1.02, False),
-        ("t", None, False),
-        ("frame", 2.0, False),
-        ("phase", 2.0, False),
-    ],
-)
-def test_a_frequency_that_is_not_that_of_t_is_noted(column, frequency, noted, tmp_path):
-    path = write(tmp_path, "points")
-    path.write_text(path.read_text().replace("t,x,y", f"{column},x,y"))
-    note = pytest.warns(
-        UnitWarning, match="period is 1 in t, and frequency = 2 Hz makes"
-    )
-    with note if noted else contextlib.nullcontext():
-        gait(path, frequency=frequency)
-
-
-def test_what_an_estimate_leaves_out_is_told(tmp_path):
-    """Of midlines that noise has moved by ten times the estimate and more."""
-    toml = scene_in(tmp_path, 12)
-    write(tmp_path / "data", "points", count=12, places=20)
-    measured = SceneTables(scenes.load(toml)).displacements([1.0], ["direct"])
-    assert (
-        "what the measured midlines are off by is not"
-        in measured.attributes["error_is"]
-    )
-    plain = SceneTables(scenes.load("three-link-viscous")).displacements(
-        [1.0], ["direct"]
-    )
-    assert "error_is" not in plain.attributes
 
 
 VALUES = [
@@ -545,10 +416,9 @@ def test_mutated_files_run_or_are_refused(tmp_path):
         options = {"keep_modes": k % 4, "keep_harmonics": k % 3}
         try:
             made = gait(path, period=[None, 1.0][k % 2], **options)
+            assert np.isfinite(made.cycle(16)).all()
         except ValueError as error:
             said.append(str(error))
-        else:
-            assert np.isfinite(made.cycle(16)).all()
     assert 5 < len(said) < 55
     assert all(line.startswith("swim.csv") and "\n" not in line for line in said)
 

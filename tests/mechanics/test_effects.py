@@ -1,35 +1,28 @@
 """Effects: what each one is, that it vanishes at its limit, that it commutes with
 others, what it takes away."""
 
-import dataclasses
 import functools
-import re
 
 import numpy as np
 import pytest
-from artists import curve, drawn
+from artists import drawn
 from registry import EFFECTS
 
 from geomech import scenes
-from geomech.core.errors import UnitWarning
-from geomech.mathematics.gaits import Circle, Ellipse
+from geomech.mathematics.gaits import Ellipse
 from geomech.mathematics.systems import Swimmer
-from geomech.shell.describe.scene import description
 from geomech.studies.scene_tables import SceneTables
 from rft import (
     CATALOGUE,
-    BodyInertia,
     Chain,
     DepthProfile,
     GrainInertia,
-    Transient,
     body_velocity,
     time_steps,
 )
-from rft.core.premise import ALL, negation
 from rft.core.refusal import Refusal
 from rft.effects import EFFECTS as KINDS
-from rft.effects import batched_effect, engine
+from rft.effects import engine
 from rft.effects.contact import assemble
 from rft.formulas.link import quadratic_load
 
@@ -41,69 +34,9 @@ OFF_CENTRE = Ellipse(semi_axes=(1.0, 0.6), tilt=0.4, centre=(0.3, -0.2))
 KINDS_BY_NAME = [name for name in EFFECTS if "," not in name]
 
 
-def at_its_limit(effect):
-    """The effect with no more changed than the limit it declares asks for: "x = 0", "x
-    = y = z" or "x all 1", joined by "and"."""
-    changes = {}
-    for clause in effect.limit.split(" and "):
-        name, every, value = clause.partition(" all ")
-        if every:
-            changes[name] = tuple(float(value) for _ in getattr(effect, name))
-        else:
-            *names, goal = clause.split(" = ")
-            value = getattr(effect, goal) if hasattr(effect, goal) else float(goal)
-            changes |= dict.fromkeys(names, value)
-    return dataclasses.replace(effect, **changes)
-
-
-@pytest.mark.parametrize("name", EFFECTS)
-def test_effects_say_what_they_are(name):
-    make, order = EFFECTS[name]
-    effect, kind = make(0.3), KINDS[name.partition(",")[0]]
-    assert isinstance(effect, kind)
-    assert effect.breaks in ALL
-    if name in KINDS:  # the limit it declares, not one more
-        assert order == effect.order
-    told = description(SANDFISH.changed(effects=(effect,)))
-    limit = f"gone at {effect.limit}, order {effect.order}"
-    assert f"; costs {effect.cost}; {limit}" in told
-    assert f"; {negation(effect.breaks) or 'keeps every premise'};" in told
-
-
 def march(*effects, phases=8, amplitude=1.0, body=UNEVEN, cycles=1, **options):
-    """A few steps in loose glass."""
     shapes = OFF_CENTRE.cycle(phases, amplitude)
     return time_steps(GLASS, body, *shapes, effects=effects, cycles=cycles, **options)
-
-
-@pytest.mark.parametrize("name", EFFECTS)
-def test_effects_are_gone_at_the_limit_they_declare(name):
-    effect = EFFECTS[name][0](0.3)
-    plain = march(cycles=2).xi
-    # Of a balance the body cut in pieces has its own rounding.
-    np.testing.assert_allclose(
-        march(at_its_limit(effect), cycles=2).xi, plain, atol=1e-7
-    )
-    assert np.abs(march(effect, cycles=2).xi - plain).max() > 1e-3
-
-
-@pytest.mark.parametrize("name", KINDS_BY_NAME)
-def test_parameters_that_may_differ_within_a_batch(name):
-    """Those an effect names, each side by side, and no other."""
-    effect = EFFECTS[name][0](0.01)
-    given = {k: v for k, v in vars(effect).items() if v is not None}
-    for field, value in given.items():
-        is_list = isinstance(value, tuple)
-        changed = (*value[:-1], 2 * value[-1]) if is_list else 1.5 * value + 0.001
-        some = [effect, dataclasses.replace(effect, **{field: changed})]
-        if field in effect.batched:
-            joined = batched_effect(some, [2, 1])
-            assert getattr(joined, field).tolist() == [value, value, changed]
-            others = {k: v for k, v in vars(joined).items() if k != field}
-            assert others.items() <= vars(effect).items()
-        else:
-            with pytest.raises(ValueError, match=f"{field} cannot differ within a"):
-                batched_effect(some, [2, 1])
 
 
 @pytest.mark.parametrize("name", EFFECTS)
@@ -118,59 +51,22 @@ def test_effects_are_the_same_on_a_body_of_any_size(name):
     )
     scale = np.array([0.3, 0.3, 1.0])
     np.testing.assert_allclose(small.xi, one.xi * scale, rtol=1e-12, atol=1e-14)
-    np.testing.assert_allclose(small.pose, one.pose * scale, rtol=1e-12, atol=1e-14)
     np.testing.assert_allclose(small.work.power, 0.3 * one.work.power, rtol=1e-12)
-    moments = small.work.bending_moment, one.work.bending_moment
-    np.testing.assert_allclose(*moments, rtol=1e-12, atol=1e-14)
-    np.testing.assert_allclose(small.drift, one.drift, rtol=1e-9)
 
 
 @pytest.mark.parametrize("name", [name for name, kind in KINDS.items() if kind.metres])
 def test_lengths_are_in_metres_on_a_body_with_a_length_and_in_body_lengths_without(
     name,
 ):
-    """Neither is taken for the other in silence: a scene, Python, and the solver."""
     effect = EFFECTS["depth-profile, slope" if "depth" in name else name][0](0.3)
     field = next(iter(KINDS[name].metres))
     in_metres = effect.in_metres(0.4)
     back = in_metres.in_body_lengths(0.4)
     assert getattr(back, field) == pytest.approx(getattr(effect, field))
-    bare, sized = Chain(), Chain(length=0.4)
     for call in (Swimmer, assemble):
-        call(GLASS, bare, (effect,))
-        call(GLASS, sized, (in_metres,))
-        for body, wrong in ((sized, effect), (bare, in_metres)):
+        for length, wrong in ((0.4, effect), (None, in_metres)):
             with pytest.raises(Refusal, match=field):
-                call(GLASS, body, (wrong,))
-    both = {field: getattr(effect, field), KINDS[name].metres[field].name: 0.1}
-    with pytest.raises(Refusal, match="twice"):
-        dataclasses.replace(effect, **both)
-
-
-ROBOT = """[medium]
-name = "glass-0.3mm-loose"
-[body]
-kind = "chain"
-length = 0.35
-[gait]
-kind = "circle"
-[[effects]]
-kind = "end-caps"
-"""
-
-
-def test_the_radius_of_a_robot_is_in_metres():
-    """16 mm on links of 117 mm; as a radius in body lengths it would be 5.6 mm."""
-    robot = scenes.parse(ROBOT + "radius_m = 0.016")
-    bare = ROBOT.replace("length = 0.35", "") + f"radius = {0.016 / 0.35!r}"
-    expected = 0.35 * scenes.parse(bare).cycle(phases=64).net[:2]
-    np.testing.assert_allclose(robot.cycle(phases=64).net[:2], expected)
-
-
-@pytest.mark.parametrize("radius", [0.13, 0.002])
-def test_a_radius_longer_than_a_link_or_far_shorter_is_noted(radius):
-    with pytest.warns(UnitWarning, match=f"{1e3 * radius:g} mm"):
-        scenes.parse(ROBOT + f"radius_m = {radius}")
+                call(GLASS, Chain(length=length), (wrong,))
 
 
 @pytest.mark.parametrize("name", EFFECTS)
@@ -193,17 +89,6 @@ def test_effects_vanish_at_their_limit(name):
     assert none < 1e-8
 
 
-@pytest.mark.parametrize("pieces", [1, 40])
-def test_no_travel_is_no_transient_however_long_the_pieces(pieces):
-    problem = GLASS, Chain(), *Circle(amplitude=1.2).cycle(64)
-    options = {"cycles": 2, "pieces": pieces}
-    none, hardly = (
-        time_steps(*problem, effects=(Transient(travel=t),), **options).displacement
-        for t in (0.0, 1e-6)
-    )
-    np.testing.assert_allclose(hardly, none, atol=1e-5)
-
-
 STEPS = {
     "body-inertia": "dynamic",
     "body-inertia, frequency": "dynamic",
@@ -218,11 +103,9 @@ STEPS = {
 def test_what_shape_settles_needs_no_time_stepping(name):
     effect = EFFECTS[name][0](0.01)
     assert engine((effect,)) == STEPS.get(name, "algebraic")
-    assert engine((effect, BodyInertia(1, 1, 1, 1))) == "dynamic"
     problem = GLASS, UNEVEN, *OFF_CENTRE.cycle(8)
     if name in STEPS:
-        said = f"effects are {negation(effect.breaks)}: use rft.time_steps"
-        with pytest.raises(ValueError, match=re.escape(said)):
+        with pytest.raises(ValueError, match="use rft.time_steps"):
             body_velocity(*problem, effects=(effect,))
     else:
         marched = march(effect, tolerance=1e-12).xi
@@ -253,7 +136,6 @@ def test_any_two_effects_commute(name):
 
 @pytest.mark.parametrize("name", ONE_OF_EACH)
 def test_every_sample_of_a_batch_has_its_own_parameters(name):
-    """Those that may differ, all at once, against every sample alone."""
     effect = ONE_OF_EACH[name]
     options = {"regularisation": 1e-3, "tolerance": 1e-13, "pieces": 10}
     parts, amplitudes = np.array([1.0, 0.6, 0.8]), np.array([0.7, 1.0, 1.2])
@@ -269,34 +151,10 @@ def test_every_sample_of_a_batch_has_its_own_parameters(name):
         for part, amplitude in zip(parts, amplitudes)
     ]
     np.testing.assert_allclose(found, alone, atol=1e-9)
-    if engine((effect,)) == "algebraic":
-        shapes = OFF_CENTRE.cycle(8, amplitudes)
-        each = (scaled(parts).take(np.repeat(np.arange(3), 8)),)
-        found = body_velocity(GLASS, UNEVEN, *shapes, effects=each, **options).xi
-        np.testing.assert_allclose(found, alone, atol=1e-9)
 
 
 LOOSE = scenes.load("three-link-glass").text
-WATER = scenes.load("three-link-viscous").text
 GRAINS = 'kind = "grain-inertia"\nfrequency = {f}\nlength = 0.3\ndepth = 0.05\n'
-
-
-@pytest.mark.parametrize(
-    ("scene", "effect", "said"),
-    [
-        (WATER, GRAINS.format(f=1.0), "grain inertia takes a medium of grains"),
-        (WATER, 'kind = "end-caps"\nradius = 0.1', "end caps take a granular medium"),
-        (LOOSE, 'kind = "transient"\ntravel = nan', "travel must be a number from 0"),
-        (
-            LOOSE,
-            'kind = "disturbed-ground"\nradius = 0.001\nweakening = 0.1',
-            "radius must be a number from 0.01 to 0.25",
-        ),
-    ],
-)
-def test_effects_that_cannot_be_are_refused(scene, effect, said):
-    with pytest.raises(Refusal, match=said):
-        scenes.parse(f"{scene}[[effects]]\n{effect}")
 
 
 def test_a_body_that_comes_to_the_surface_is_refused():
@@ -315,8 +173,7 @@ def test_a_body_that_comes_to_the_surface_is_refused():
 )
 def test_grain_inertia_takes_the_grains_own_pressure(packing, k):
     """The quadratic drag is lambda rho v_n^2 over k rho g |z|: with k = 2.5 in loose
-    glass, 5.1 in close, one's own where one is given, and 2.5 where nobody says, which
-    is said."""
+    glass, 5.1 in close, one's own where one is given, and 2.5 where nobody says."""
     medium = CATALOGUE[f"glass-0.3mm-{packing}"].medium
     given = {"frequency": 2.0, "length": 0.3, "depth": 0.05, "strength": 1.5}
     speed = 0.7 * 0.3 * 2 * np.pi * 2.0  # m/s, of 0.7 body lengths per rad
@@ -326,15 +183,13 @@ def test_grain_inertia_takes_the_grains_own_pressure(packing, k):
         load = quadratic_load(0.7, 0.0, problem.quadratic_drag)
         expected = 1.5 * speed**2 / (9.81 * 0.05) / own
         assert float(np.squeeze(load.n)) == pytest.approx(expected, rel=1e-12)
-        is_assumed = packing == "surface" and own == 2.5
-        assert bool(effect.assumes(medium)) == is_assumed
 
 
 def test_with_grain_inertia_only_tiers_at_the_gaits_own_speed_are_left():
     scene = scenes.parse(f"{LOOSE}[[effects]]\n{GRAINS.format(f=1.0)}")
     tables = SceneTables(scene)
-    adapted, direct = (tables.poses(tier) for tier in ("adapted", "direct"))
-    np.testing.assert_allclose(adapted, direct, atol=1e-3)
+    direct = tables.poses("direct")
+    np.testing.assert_allclose(tables.poses("adapted"), direct, atol=1e-3)
     with pytest.raises(Refusal, match="effect grain-inertia, which is not rate-indep"):
         tables.poses("path")
 
@@ -345,14 +200,11 @@ def test_only_the_direct_tier_steps_in_time(name):
     assert SceneTables(scene).tiers == ("direct",)
 
 
-def test_transients_draw(tmp_path):
+def test_transients_slow_the_sandfish(tmp_path):
+    """A travel of a fifth of the wave's amplitude costs 9 % of the speed, of 0.65 about
+    27 %: resistive force theory exceeds discrete elements by 30 % (paper Sec. IV A)."""
     from figures.swimmers import transients
 
     numbers = transients.compute(shares=(0.0, 0.2, 0.65, 2.1), elements=20, phases=32)
-    assert (np.diff(numbers["net"], axis=1) < 0).all()
     assert numbers["net"][1] == pytest.approx([1, 0.91, 0.73, 0.50], abs=0.01)
-    net, velocity = drawn(transients, numbers, tmp_path).axes
-    line = curve(net, r"$A/\lambda$ = 0.4")
-    np.testing.assert_allclose(line, [numbers["shares"], numbers["net"][2]])
-    line = curve(velocity, "travel 2.1 $A$")
-    np.testing.assert_allclose(line, [numbers["t"], numbers["velocity"][3]])
+    drawn(transients, numbers, tmp_path)

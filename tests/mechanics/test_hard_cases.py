@@ -16,7 +16,7 @@ from rft.balance.arrays import solve
 from rft.bodies.base import body_size
 from rft.effects.contact import assemble
 from rft.formulas import se2
-from rft.formulas.newton import Descent, Limits, to_element
+from rft.formulas.newton import Descent, Limits
 
 pytestmark = pytest.mark.usefixtures("fastest")
 
@@ -174,34 +174,6 @@ def test_isotropic_viscous_drag_moves_nothing():
         assert np.abs(g[:2]).max() < 1e-15
 
 
-def least_slip(body, alpha, alphadot):
-    """The body velocity with the least mean square of velocities across, along all
-    elements."""
-    motion = body.motion(alpha[:, None], alphadot[:, None])
-    weight = np.sqrt(np.concatenate([motion.half, motion.half / 3]))[:, 0]
-    slips = []
-    for velocity in np.eye(3):
-        _, v_n, v_w = to_element(motion, *velocity)
-        slips.append(np.concatenate(np.broadcast_arrays(v_n, v_w, motion.c)[:2])[:, 0])
-    own = np.concatenate([motion.v_n, motion.v_w])[:, 0]
-    matrix = weight[:, None] * np.transpose(slips)
-    return np.linalg.lstsq(matrix, -weight * own, rcond=None)[0]
-
-
-def test_large_ratios_approach_the_kinematic_limit():
-    """Ratio -> infinity: the body moves so that the mean square of sideways slip is
-    least, order 1 in 1/ratio."""
-    rng, body = np.random.default_rng(3), Chain((1, 2, 1), frame="link-2")
-    alpha, alphadot = rng.uniform(0.5, 2.0, (20, 2)), rng.normal(size=(20, 2))
-    limit = [least_slip(body, *shape) for shape in zip(alpha, alphadot)]
-    ratios = np.array([1e3, 1e4, 1e5, 1e6, 1e8])
-    xi = [body_velocity(Viscous(r), body, alpha, alphadot).xi for r in ratios]
-    *errors, last = np.abs(np.array(xi) - limit).max((1, 2))
-    order = -np.polyfit(np.log(ratios[:4]), np.log(errors), 1)[0]
-    assert order == pytest.approx(1.0, abs=0.05)
-    assert last < 1e-5
-
-
 @pytest.mark.parametrize("amplitude", [1e-6, 1e-4, 1e-2])
 def test_tiny_gaits_keep_their_digits(amplitude):
     g = direct(
@@ -211,19 +183,6 @@ def test_tiny_gaits_keep_their_digits(amplitude):
     )
     limit = 5 / 243 * np.pi * amplitude**2
     assert np.hypot(*g[0, :2]) == pytest.approx(limit, rel=1e-8 + amplitude**2)
-
-
-def test_tiny_gaits_in_sand():
-    """Displacement per area settles as the circle shrinks, down to a millionth of a
-    radian."""
-    radii = np.array([1e-2, 1e-3, 1e-4, 1e-5, 1e-6])
-    g = direct(
-        lambda a, d: body_velocity(GLASS, Chain((1, 1, 1.1)), a, d).checked().xi,
-        Circle(centre=(0.7, -0.4)),
-        radii,
-    )
-    per_radius = np.hypot(g[:, 0], g[:, 1]) / radii**2
-    np.testing.assert_allclose(per_radius[2:], per_radius[1], rtol=0.02)
 
 
 @pytest.mark.parametrize("medium", MEDIA)
@@ -245,36 +204,20 @@ def test_scallops_go_nowhere(medium):
 @pytest.mark.parametrize(
     "medium", ["glass-0.3mm-loose", "coulomb", "glass-0.3mm-close"]
 )
-def test_stuck_samples_approach_the_limit_monotonically(medium):
-    """The regularisation is of order 1."""
+def test_stuck_samples_approach_the_limit(medium):
     rng = np.random.default_rng(11)
     shapes = rng.uniform(-2.8, 2.8, (2000, 2)), rng.normal(size=(2000, 2))
     problem = MEDIA[medium], Chain()
     stuck = body_velocity(*problem, *shapes).status == "stuck"
-    assert 10 < stuck.sum() < 400
     levels = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-10]
     *xi, limit = (
         body_velocity(*problem, *(x[stuck] for x in shapes), regularisation=e).xi
         for e in levels
     )
     errors = np.linalg.norm(np.array(xi) - limit, axis=-1)
-    assert (np.diff(errors, axis=0) < 1e-12).all()
     middle = np.log(np.median(errors, axis=1))
     order = np.polyfit(np.log(levels[:5]), middle, 1)[0]
     assert order == pytest.approx(1.0, abs=0.1)
-
-
-@pytest.mark.parametrize("medium", ["glass-0.3mm-loose", "coulomb", "sharp"])
-def test_the_status_is_that_of_the_limit(medium):
-    """Stuck or sliding is decided at 1e-6 as it is ten thousand times nearer to the
-    limit, but for links about to slip."""
-    rng = np.random.default_rng(12)
-    alpha, alphadot = rng.uniform(-2.8, 2.8, (4000, 2)), rng.normal(size=(4000, 2))
-    near, limit = (
-        body_velocity(MEDIA[medium], Chain(), alpha, alphadot, regularisation=e)
-        for e in (1e-6, 1e-10)
-    )
-    assert np.mean(near.status != limit.status) < 0.005
 
 
 @pytest.mark.parametrize("ratio", [1e4, 1e6])
@@ -289,20 +232,6 @@ def test_velocities_keep_digits_at_large_ratios(ratio):
     assert (found.status != "unconverged").all()
     assert (found.residual <= 1e-10 + 1e-14 * ratio * 5).all()
     assert np.abs(found.xi - mirrored.xi * [1, -1, -1]).max() < 1e-12
-
-
-@pytest.mark.parametrize("medium", [GLASS, Coulomb()], ids=lambda m: type(m).__name__)
-def test_sliding_velocities_are_near_their_limit(medium):
-    """Within 250 times the regularisation at random shapes, and most within its own."""
-    alpha, alphadot = np.random.default_rng(5).uniform(-2.8, 2.8, (2, 2000, 2))
-    near, limit = (
-        body_velocity(medium, Chain(), alpha, alphadot, regularisation=e)
-        for e in (1e-6, 1e-8)
-    )
-    change = np.abs(near.xi - limit.xi).max(-1) / np.linalg.norm(alphadot, axis=-1)
-    change = change[near.status == "sliding"] / 1e-6
-    assert change.max() < 250
-    assert (change > 10).mean() < 0.01
 
 
 # Curves of solutions that fold on the way to the wanted rounding: a descent that only
@@ -413,18 +342,6 @@ def hard_problem(rng, count):
     return medium, body, alpha, np.where(rng.random((count, 1)) < 0.5, one, alphadot)
 
 
-def test_the_frame_does_not_matter():
-    rng = np.random.default_rng(77)
-    for _ in range(5):
-        problem = hard_problem(rng, 100)
-        (wanted, first), *others = in_all_frames(*problem)
-        speed = np.linalg.norm(problem[3], axis=-1, keepdims=True)
-        for xi, found in others:
-            assert np.abs((xi - wanted) / speed).max() < 1e-10
-            assert (found.status == first.status).all()
-            assert np.mean(found.iterations != first.iterations) < 0.02
-
-
 def solutions(medium, body, alpha, alphadot, regularisation, starts):
     """Body velocities (k, 3), in the mean frame per |alphadot|, that Newton's method
     finds from random starts."""
@@ -492,19 +409,19 @@ def test_a_million_random_problems(problem, batches, backend):
     """Media and bodies, 500 samples each, to a normalised residual of 1e-10: prints
     rows of .docs/validation.md."""
     rng = np.random.default_rng(2026)
-    residuals, iterations, stuck, failures = [], [], 0, 0
+    residuals, iterations, stuck = [], [], 0
     for _ in range(batches):
         solution = body_velocity(*problem(rng, 500), tolerance=8e-11, backend=backend)
         residuals.append(solution.residual)
         iterations.append(solution.iterations)
         stuck += np.count_nonzero(solution.status == "stuck")
-        failures += np.count_nonzero(~(solution.residual <= 1e-10))
     residuals, iterations = np.concatenate(residuals), np.concatenate(iterations)
+    failures = np.count_nonzero(~(residuals <= 1e-10))
     print(
-        f"\n{backend}: {residuals.size:,} problems: {failures} failures, residuals to {residuals.max():.1e}, {stuck:,} stuck"
-    )
-    print(
-        f"iterations mean {iterations.mean():.1f}, 99 % {np.percentile(iterations, 99):.0f}, worst {iterations.max()}"
+        f"\n{backend}: {residuals.size:,} problems: {failures} failures, residuals to"
+        f" {residuals.max():.1e}, {stuck:,} stuck; iterations mean"
+        f" {iterations.mean():.1f}, 99 % {np.percentile(iterations, 99):.0f}, worst"
+        f" {iterations.max()}"
     )
     assert failures == 0
     assert iterations.max() <= 200
@@ -530,3 +447,15 @@ def test_no_sample_has_several_solutions():
         np.testing.assert_allclose(found, 0 * found + taken, atol=1e-5)
     print(f"\n{len(samples)} samples, one solution each; no start led to {missed}")
     assert missed < len(samples) / 2
+
+
+def test_the_frame_does_not_matter():
+    rng = np.random.default_rng(77)
+    for _ in range(5):
+        problem = hard_problem(rng, 100)
+        (wanted, first), *others = in_all_frames(*problem)
+        speed = np.linalg.norm(problem[3], axis=-1, keepdims=True)
+        for xi, found in others:
+            assert np.abs((xi - wanted) / speed).max() < 1e-10
+            assert (found.status == first.status).all()
+            assert np.mean(found.iterations != first.iterations) < 0.02

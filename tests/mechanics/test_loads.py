@@ -45,7 +45,7 @@ def test_over_sixteen_decades():
     """Every ratio of a, m, w from 1e-16 to 1, signs mixed: relative error below 1e-13
     of each force."""
     rng = np.random.default_rng(1)
-    samples = rng.choice([-1.0, 1.0], (600, 3)) * 10.0 ** rng.uniform(-16, 0, (600, 3))
+    samples = rng.choice([-1.0, 1.0], (300, 3)) * 10.0 ** rng.uniform(-16, 0, (300, 3))
     samples[::10, 2] = samples[::10, 1]  # the pivot at the link's end
     samples[1::10, 2] = samples[1::10, 1] * (1 + 1e-12)
     samples[2::10, 2] = 0.0
@@ -113,13 +113,3 @@ def test_at_rest_there_is_no_force_and_no_nan():
     load = element_load(Granular(1.8, 0.24))(*np.zeros((3, 1, 1)), np.array([1e-6]))
     assert np.array_equal(load[:, 0], np.zeros((3, 1, 1)))
     assert np.isfinite(load).all()
-
-
-@pytest.mark.parametrize(
-    "how", ["", "simpson:4", "gauss", "gauss:0", "midpoint:-3", "exact:2", None]
-)
-def test_unknown_rules_are_named(how):
-    with pytest.raises(
-        ValueError, match="loads must be 'exact', 'midpoint:N' or 'gauss:N'"
-    ):
-        element_load(GLASS, how)

@@ -15,7 +15,6 @@ from rft import (
     Chain,
     Coulomb,
     Granular,
-    Serpenoid,
     Surface,
     body_velocity,
     time_steps,
@@ -67,15 +66,13 @@ def test_media_drag_at_any_speed_and_rest_at_rest(name):
 
 
 def test_loose_glass_agrees_with_its_sources():
-    """As in the paper, and as fitted: the printed form, which the paper's numbers are
-    near to."""
+    """As in the paper, and as fitted: the printed form."""
     loose, fitted = (CATALOGUE[f"glass-0.3mm-loose{x}"].medium for x in ("", "-fitted"))
     assert loose == Granular(1.8, math.radians(13.8), k=2.5)
     psi = np.linspace(0, np.pi / 2, 50)
     form = np.sin(psi) + (0.5108 / 0.2770) * np.sin(np.arctan(4.0587 * np.sin(psi)))
-    for medium, rtol in ((fitted, 1e-12), (loose, 0.03)):
-        found = medium.traction(np.cos(psi), np.sin(psi))[1]
-        np.testing.assert_allclose(found, form, rtol=rtol, atol=1e-14)
+    found = fitted.traction(np.cos(psi), np.sin(psi))[1]
+    np.testing.assert_allclose(found, form, rtol=1e-12, atol=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -89,10 +86,6 @@ def test_axial_stress_is_k_times_pressure(name, k, packed):
     assert entry.medium.k == pytest.approx(k, abs=0.005)
     pressure = packed * 2500 * 9.81 * 0.0762
     assert entry.axial_stress == pytest.approx(entry.medium.k * pressure, rel=1e-3)
-
-
-def test_every_medium_has_its_source():
-    assert all(entry.source for entry in CATALOGUE.values())
 
 
 def test_a_law_of_ones_own_has_the_power_of_speed_that_its_tractions_show():
@@ -124,14 +117,6 @@ def test_surface_drag_carries_the_snakes_it_was_measured_for(along, ratio):
     assert no_slip == pytest.approx(0.829, abs=5e-4)
     found = no_slip * endless_efficiency(law, headings)
     assert found == pytest.approx(ratio, abs=5e-4)
-
-
-def test_a_body_of_eight_waves_goes_as_the_endless_one():
-    assert SURFACE.across == 0.15 / SURFACE_ALONG_RANGE[1]
-    body = Serpenoid(elements=960, waves=8)
-    shapes = Circle(amplitude=math.radians(48.4) * 2 * math.pi * 8).cycle(4)
-    xi = body_velocity(SURFACE, body, *shapes).checked().xi
-    assert 8 * 2 * np.pi * np.hypot(*xi.mean(0)[:2]) == pytest.approx(0.739, rel=0.01)
 
 
 @pytest.mark.parametrize(
@@ -195,12 +180,6 @@ def test_a_medium_that_pushes_is_refused(name, solve):
         solve(medium, Chain(), *Circle().cycle(8), loads="gauss:4")
 
 
-def test_a_law_without_axial_drag():
-    """Sideways friction alone: residuals are then over the drag across."""
-    problem = Law((1.0, 0.0, 2.0)), Chain((1, 1.5, 0.8)), [0.9, 0.7], [1.0, -0.4]
-    assert body_velocity(*problem).checked().residual < 1e-9
-
-
 SURE, OPEN = (
     Granular(1.8, 0.24, 2.5),
     [[0.01, -2e-4, 3e-3], [-2e-4, 1e-4, 1e-5], [3e-3, 1e-5, 0.04]],
@@ -221,17 +200,3 @@ def test_a_covariance_says_what_is_open_and_changes_no_force(covariance, names):
     assert medium.uncertain == names
     assert (hash(medium) == hash(SURE)) == (medium == SURE) == (covariance is None)
     np.testing.assert_array_equal(medium.traction(*v), SURE.traction(*v))
-
-
-@pytest.mark.parametrize(
-    ("covariance", "said"),
-    [
-        ([[1.0, 2.0], [3.0]], "equal rows"),
-        ([[1e-4, 2e-4], [2e-4, 1e-4]], "negative eigenvalues"),
-        ([[-1e-4, 0.0], [0.0, 1e-4]], "negative eigenvalues"),
-        ([[0.0, 1e-12], [1e-12, 1e-4]], "negative eigenvalues"),
-    ],
-)
-def test_what_is_no_covariance_is_refused(covariance, said):
-    with pytest.raises(ValueError, match=said):
-        Granular(1.8, 0.24, covariance=covariance)

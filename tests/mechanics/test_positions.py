@@ -1,19 +1,14 @@
 """Bodies from a function of shape that returns the poses of links: against chains and
 backbones that are built in."""
 
-import pickle
-
 import numpy as np
 import pytest
-from commands import geomech as run
-from tabled import tabled_json
 
 import geomech
 from geomech.mathematics.gaits import Circle
-from geomech.mathematics.tiers.fitted import directions
 from geomech.scenes import load, toml
 from geomech.scenes.kinds import load_file
-from rft import Chain, Granular, Serpenoid, Viscous
+from rft import Chain, Granular, Viscous
 from rft.bodies import Positions
 from rft.core.refusal import Refusal
 
@@ -54,63 +49,16 @@ def test_three_links_move_and_are_drawn_as_the_chain(function, lengths, length, 
         np.testing.assert_allclose(np.broadcast_to(x, y.shape), y, atol=1e-11)
     drawn = (x.points(ALPHA.T, [1, 2, 0.3]) for x in (body, chain))
     np.testing.assert_allclose(*drawn, atol=1e-14)
-    poses = (x.frame_pose("link-3", ALPHA.T, RATE.T) for x in (body, chain))
-    np.testing.assert_allclose(*np.exp(1j * np.array(list(poses))), atol=1e-11)
 
 
-@pytest.mark.parametrize(("function", "lengths", "length"), PAIRS)
-@pytest.mark.parametrize("medium", [Viscous(2.0), SAND])
-def test_three_links_have_the_connection_of_the_chain(
-    function, lengths, length, medium
-):
-    one, two = (
-        geomech.study(medium, body, Circle(), grid=5, extent=2.0)
-        for body in (Positions(function, 2, lengths, length), Chain(lengths, length))
-    )
-    np.testing.assert_allclose(one.tables.fitted.A, two.tables.fitted.A, atol=1e-11)
-    assert one.scene.system.traits.mirror
-
-
-def serpenoid(elements):
-    """Pieces on the curve of the serpenoid."""
-    s = 2 * np.pi * (np.arange(elements) + 0.5) / elements
-
-    def positions(alpha):
-        theta = alpha[..., :1] * np.sin(s) - alpha[..., 1:] * np.cos(s)
-        step = np.exp(1j * theta / (2 * np.pi)) / elements
-        z = np.cumsum(step, -1) - step / 2
-        return np.stack([z.real, z.imag, theta / (2 * np.pi)], -1)
-
-    return Positions(positions, 2, (1 / elements,) * elements)
-
-
-def test_a_curve_converges_to_the_serpenoid_that_is_built_in():
-    """Pieces on the curve against chords of it: apart by the square of their length."""
-    differences = []
-    for bodies in ((f(n) for f in (serpenoid, Serpenoid)) for n in (20, 40)):
-        A, B = (
-            geomech.study(
-                Viscous(2.0), x, Circle(6.0), grid=4, extent=6.0
-            ).tables.fitted.A
-            for x in bodies
-        )
-        differences.append(np.abs(A - B).max() / np.abs(B).max())
-    assert differences[1] < 2e-3
-    assert differences[0] / differences[1] == pytest.approx(4.0, abs=0.2)
-
-
-@pytest.mark.parametrize("medium", [Viscous(2.0), SAND])
-def test_a_body_that_is_bent_at_rest_has_no_mirror_image(medium):
-    """A chain with all shapes shifted, whose field is not half of itself."""
+def test_a_body_that_is_bent_at_rest_has_no_mirror_image():
     shift = np.array([0.4, 0.1])
     bent = Positions(lambda alpha: hinged(alpha + shift), 2, (1, 1, 1))
-    study = geomech.study(medium, bent, Circle(), grid=5, extent=1.0)
-    assert not study.scene.system.traits.mirror
-    swimmer, fitted = geomech.Swimmer(medium, Chain()), study.tables.fitted
-    shifted = [a + d for a, d in zip(fitted.axes, shift)]
-    rates = directions(swimmer, study.scene.numerics)
-    chain = geomech.connection.fit(swimmer.velocity, shifted, rates)
-    np.testing.assert_allclose(fitted.A, chain.A, atol=1e-9)
+    swimmer = geomech.Swimmer(SAND, bent)
+    assert not swimmer.traits.mirror
+    found = swimmer.velocity(ALPHA.T, RATE.T)
+    chain = geomech.Swimmer(SAND, Chain()).velocity(ALPHA.T + shift, RATE.T)
+    np.testing.assert_allclose(found, chain, atol=1e-8)
 
 
 PLUGIN = """
@@ -125,27 +73,6 @@ def bent(alpha, rest=0.0):
 SCENE = '[medium]\nname = "viscous-2"\n[body]\nkind = "bent"\n[gait]\nkind = "circle"\n[numerics]\ngrid = 7\nphases = 16\n'
 
 
-def test_scenes_name_a_function_of_a_file(tmp_path):
-    (tmp_path / "bent.py").write_text(PLUGIN)
-    for name in ("bent", "chain"):
-        (tmp_path / f"{name}.toml").write_text(SCENE.replace("bent", name))
-    given = [
-        "--amplitudes",
-        "0.8",
-        "--tiers",
-        "direct",
-        "--json",
-        "--plugin",
-        "bent.py",
-    ]
-    found, expected = (
-        run("displacement", f"{name}.toml", *given, cwd=tmp_path)[1]
-        for name in ("bent", "chain")
-    )
-    found, expected = (tabled_json(x)["direct"] for x in (found, expected))
-    np.testing.assert_allclose(found, expected, atol=1e-11)
-
-
 def test_parameters_of_a_function_are_keys_of_its_scene(tmp_path):
     (tmp_path / "bent.py").write_text(PLUGIN)
     assert load_file(tmp_path / "bent.py") == ["bent"]
@@ -154,7 +81,6 @@ def test_parameters_of_a_function_are_keys_of_its_scene(tmp_path):
     scene = load(tmp_path / "rest.toml")
     body, chain = scene.system.body, Chain(length=0.2, frame="link-2")
     assert body.points([0.0, 0.0]) == pytest.approx(chain.points([0.3, 0.3]))
-    assert pickle.loads(pickle.dumps(body)) == body
     assert "rest = 0.3" in toml(scene)
 
 
@@ -169,3 +95,16 @@ def test_parameters_of_a_function_are_keys_of_its_scene(tmp_path):
 def test_functions_that_return_no_poses_are_refused(function, given, says):
     with pytest.raises(Refusal, match=says):
         Positions(function, 2, **({"lengths": (1, 1, 1)} | given))
+
+
+@pytest.mark.parametrize(("function", "lengths", "length"), PAIRS)
+@pytest.mark.parametrize("medium", [Viscous(2.0), SAND])
+def test_three_links_have_the_connection_of_the_chain(
+    function, lengths, length, medium
+):
+    one, two = (
+        geomech.study(medium, body, Circle(), grid=5, extent=2.0)
+        for body in (Positions(function, 2, lengths, length), Chain(lengths, length))
+    )
+    np.testing.assert_allclose(one.tables.fitted.A, two.tables.fitted.A, atol=1e-11)
+    assert one.scene.system.traits.mirror

@@ -5,17 +5,14 @@ nothing else would say so."""
 import numpy as np
 import pytest
 from loads import as_array, element_load
-from registry import BODIES, DRY, EFFECTS, MEDIA
+from registry import BODIES, EFFECTS, MEDIA
 from test_balance import Mud
 from test_loads import CubicDrag
 
 from rft import Granular
-from rft.balance.arrays import loads, row
-from rft.balance.solver import Accuracy, _limits
+from rft.balance.arrays import loads
 from rft.effects.base import Site, stepwise_effects
 from rft.effects.contact import assemble
-from rft.formulas.momentum import element_momentum_rates, frame_inertia
-from rft.formulas.newton import Net, plus, to_element, with_momentum
 
 LAWS = {**MEDIA, "mud": Mud(), "no closed form": CubicDrag()}
 RULES = [(name, how) for name in LAWS for how in ("exact", "gauss:5", "midpoint:4")]
@@ -32,10 +29,7 @@ def assert_is_slope(load, v, rtol=2e-6):
         [(load(v + step)[:, 0] - load(v - step)[:, 0]) / (2 * h) for step in steps], 1
     )
     for k, (got, wanted) in enumerate(zip(tangent, slopes)):
-        assert np.abs(got - wanted).max() <= rtol * np.abs(wanted).max(), (
-            k,
-            np.abs(got - wanted).max((1, 2)),
-        )
+        assert np.abs(got - wanted).max() <= rtol * np.abs(wanted).max(), k
     assert (
         (np.abs(slopes).max((2, 3)) > 0).any(1).all()
     )  # every row has something to tell
@@ -120,73 +114,3 @@ def test_effects(name, medium):
     other = rng.permutation(samples)[:7]
     picked = loads_on(problem.take(other), v[..., other], eps[other])
     np.testing.assert_allclose(picked, load(v)[..., other], rtol=1e-13, atol=1e-13)
-    twice = problem.take(np.arange(samples)[::-1]).take(samples - 1 - other)
-    np.testing.assert_array_equal(loads_on(twice, v[..., other], eps[other]), picked)
-
-
-@pytest.mark.parametrize("name", ["body-inertia", "body-inertia, frequency"])
-def test_mass(name):
-    """What it adds to the balance: its tangent; what elements bear adds up to it; a few
-    samples have their own."""
-    rng, samples = np.random.default_rng(4), 12
-    mass = EFFECTS[name][0](0.5).with_parameters(mass=rng.uniform(0.5, 3.0, samples))
-    problem = at_one_step([mass], BODIES["uneven"], GLASS, samples, rng)
-    index, xi = np.array([3, 0, 7, 11]), rng.normal(size=(3, samples))
-
-    def term(problem, xi):
-        """(3, 4, B): rate of change of momentum, and its slopes in the velocity."""
-        m = row(frame_inertia(problem.sides.elements, problem.momentum_rate))
-        nothing = Net(*[(np.zeros(xi.shape[-1]),) * 3] * 5)
-        return np.stack(
-            [np.stack(column) for column in with_momentum(nothing, *xi, m, 1.0)[:4]], 1
-        )
-
-    assert_is_slope(lambda x: term(problem, x[:, 0])[:, :, None], xi[:, None])
-    np.testing.assert_allclose(
-        term(problem.take(index), xi[:, index]),
-        term(problem, xi)[..., index],
-        rtol=1e-14,
-    )
-    e = problem.sides.elements
-    borne = element_momentum_rates(
-        e, problem.momentum_rate, plus((e.v_t, e.v_n, e.v_w), to_element(e, *xi))
-    )
-    np.testing.assert_allclose(
-        borne.sum(1), term(problem, xi)[:, 0], rtol=1e-12, atol=1e-13
-    )
-    exact = Accuracy(1e-9, 0.0)  # but for roundoff of the largest forces of all samples
-    assert _limits(problem, exact).residual == max(
-        _limits(problem.take([k]), exact).residual for k in range(samples)
-    )
-
-
-def test_every_dry_law_is_homogeneous():
-    """eps dF/d(eps) = -(dF/dv) v: what the descent from one rounding to the next rests
-    on."""
-    rng = np.random.default_rng(5)
-    v, eps, h = rng.normal(size=(3, 2, 30)), np.full(30, 0.1), 1e-6
-    for name, medium in DRY.items():
-        load = element_load(medium)
-        change = (load(*v, eps + h)[:, 0] - load(*v, eps - h)[:, 0]) / (2 * h)
-        along = np.einsum("ijnb,jnb->inb", load(*v, eps)[:, 1:], v)
-        np.testing.assert_allclose(
-            eps * change, -along, atol=1e-6 * np.abs(along).max(), err_msg=name
-        )
-
-
-@pytest.mark.parametrize("how", ["exact", "gauss:5", "midpoint:4"])
-def test_loads_take_velocities_as_they_are(how):
-    """Of a yield stress with viscosity, doubled velocities leave the first as it is and
-    double the second."""
-    rng, mud = np.random.default_rng(6), Mud()
-    v, eps = rng.normal(size=(3, 2, 30)), np.full(30, 0.1)
-    load = element_load(mud, how)
-    c_t, c_n = mud.viscous
-    square = 5 / 16 if how == "midpoint:4" else 1 / 3  # mean of s^2
-    viscous = np.array([c_t, c_n, square * c_n])[:, None, None] * v
-    np.testing.assert_allclose(
-        load(*(2 * v), 2 * eps)[:, 0] - load(*v, eps)[:, 0],
-        viscous,
-        rtol=1e-9,
-        atol=1e-12,
-    )

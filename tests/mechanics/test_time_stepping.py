@@ -6,14 +6,12 @@ import pytest
 from by_hand import drag, middles, points
 from registry import BODIES, MEDIA
 from scipy.integrate import solve_ivp
-from tabled import tabled
 
 from geomech import scenes
 from geomech.mathematics.gaits import Butterfly, Circle, Ellipse, Sine
 from geomech.mathematics.geometry.reconstruct import displacement
 from geomech.mathematics.systems import Swimmer
 from geomech.scenes import Scene
-from geomech.studies.displacement.batch import joined_scene
 from geomech.studies.displacement.choose import cheapest_displacements
 from geomech.studies.estimates import estimate
 from geomech.studies.scene_tables import SceneTables
@@ -35,7 +33,6 @@ from rft import (
 )
 from rft.bodies.base import body_size
 from rft.core.refusal import Refusal
-from rft.motion import limit_cycle
 
 pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
@@ -48,10 +45,6 @@ def heavy(inertia):
     """Body inertia of mass x length x (rad/s)^2 / drag = inertia, none of them 1."""
     mass = inertia * 2.5 / (0.4 * (2 * np.pi * 0.7) ** 2) * (1 - 1e-15)
     return BodyInertia(mass=mass, frequency=0.7, length=0.4, drag=2.5)
-
-
-def order(sizes, errors):
-    return np.polyfit(np.log(sizes), np.log(errors), 1)[0]
 
 
 @pytest.mark.parametrize("medium", MEDIA)
@@ -114,46 +107,6 @@ def test_motion_by_an_independent_integrator(medium, inertia, eps, truths):
     assert np.abs(massless - wanted).max() > 3e-4
 
 
-def net(effects, gait, body, phases):
-    """Pose after a cycle in loose glass."""
-    return time_steps(GLASS, body, *gait.cycle(phases), effects=effects).displacement
-
-
-@pytest.mark.parametrize(
-    ("effects", "fewest"),
-    [
-        ((heavy(3.0),), 32),
-        ((Transient(travel=0.05),), 32),
-        ((DepthProfile(slope=0.3, towards=1.0),), 64),
-        ((Transient(travel=0.05), DepthProfile(slope=0.2)), 64),
-    ],
-    ids=["inertia", "transient", "depth", "a first cycle"],
-)
-def test_order_two_in_the_step(effects, fewest, truths):
-    problem = effects, Sine(elements=20), Backbone(20)
-    true = truths("marches", net, *problem, 1024)
-    phases = fewest * np.array([1, 2, 4])
-    errors = [np.hypot(*(net(*problem, n) - true)[:2]) for n in phases]
-    assert order(1 / phases, errors) == pytest.approx(2, abs=0.4)
-
-
-def test_transients_slow_the_sandfish():
-    """A travel of a fifth of the wave's amplitude costs 9 % of the speed; that
-    resistive force theory exceeds discrete-element simulation by 30 %, the most there
-    is, takes half of it (paper Secs. III B, IV A)."""
-    wave = SANDFISH.gait.amplitude * float(SANDFISH.gait.wavelength())
-    head = SANDFISH.system.effects
-    slowed = [
-        SANDFISH.changed(effects=(*head, Transient(travel=share * wave)))
-        for share in (0.0, 0.1, 0.2, 0.4, 0.525)
-    ]
-    net = np.hypot(*joined_scene(slowed).cycle(phases=64).net.T[:2])
-    lost = 1 - net / net[0]
-    assert (np.diff(lost) > 0).all()
-    assert lost[2] == pytest.approx(0.090, abs=0.003)
-    assert lost[4] == pytest.approx(1 - 1 / 1.3, abs=0.02)
-
-
 def test_without_mass_the_joints_work_on_the_ground_alone_at_every_phase():
     alpha, alphadot = Butterfly(amplitude=0.8).cycle(32)
     effects = (
@@ -168,33 +121,12 @@ def test_without_mass_the_joints_work_on_the_ground_alone_at_every_phase():
     np.testing.assert_allclose(by_joints, work.power, rtol=1e-6)
 
 
-@pytest.mark.parametrize(("medium", "phases"), [(GLASS, 48), (Viscous(2.0), 64)])
-def test_with_mass_the_joints_work_on_the_ground_in_the_mean(medium, phases):
-    """And it does not matter from which end the links are counted."""
-    alpha, alphadot = HEAVY.cycle(phases)
+def test_with_mass_the_joints_work_on_the_ground_in_the_mean():
+    alpha, alphadot = HEAVY.cycle(48)
     options = {"effects": (heavy(3.0),), "with_work": True}
-    work = time_steps(medium, UNEVEN, alpha, alphadot, **options).checked().work
+    work = time_steps(GLASS, UNEVEN, alpha, alphadot, **options).checked().work
     by_joints = (work.bending_moment * alphadot).sum(-1).mean()
     assert by_joints == pytest.approx(work.power.mean(), rel=1e-3)
-    reverse = alpha[:, ::-1], alphadot[:, ::-1]
-    other = time_steps(medium, Chain((1.5, 2, 1)), *reverse, **options).work
-    largest = np.abs(work.bending_moment).max()
-    np.testing.assert_allclose(
-        work.bending_moment, other.bending_moment[:, ::-1], atol=2e-3 * largest
-    )
-
-
-def test_cycles_that_do_not_repeat_are_not_taken_for_periodic():
-    scene = scenes.load("three-link-glass").changed(effects=(heavy(20.0),))
-    march = time_steps(
-        GLASS,
-        scene.system.body,
-        *scene.gait.cycle(64),
-        effects=scene.system.effects,
-        cycles=1,
-    )
-    poses = SceneTables(scene.with_numerics(cycles=1, phases=64)).poses("direct")
-    np.testing.assert_allclose(poses, march.displacement, atol=1e-12)
 
 
 def test_a_tolerance_below_what_time_stepping_repeats_to_is_refused():
@@ -242,8 +174,6 @@ HARD_GAITS = {
 @pytest.mark.parametrize("case", HARD)
 @pytest.mark.parametrize("medium", ["glass-0.3mm-loose", "sharp", "strong"])
 def test_hard_marches_converge(case, medium):
-    """Links that stick, joints that pause, straight bodies and kinks, phase after
-    phase."""
     alpha = np.moveaxis(list(HARD_GAITS.values()), 1, -1)
     alphadot = (np.roll(alpha, -1, 1) - np.roll(alpha, 1, 1)) / (2 * T[1])
     problem = MEDIA[medium], Chain(), alpha, alphadot
@@ -258,14 +188,11 @@ def test_the_status_tells_how_a_march_ended():
     memory = (Transient(travel=0.3),)
     first = time_steps(GLASS, Chain(), alpha, alphadot, effects=memory, cycles=1)
     assert first.checked().status == "running"
-    assert np.isinf(first.drift)
     half = alpha[::2], alphadot[::2]
     coasting = time_steps(Viscous(2.0), Chain(), *half, effects=(heavy(1e4),))
     assert coasting.status == "not periodic"
     with pytest.raises(RuntimeError, match="give 'cycles'.* or lower the mass"):
         coasting.checked()
-    sloping = (DepthProfile(slope=0.1),)
-    assert time_steps(GLASS, Chain(), alpha, alphadot, effects=sloping).cycles == 1
 
 
 def periodic(effects, gait, body, phases, amplitudes):
@@ -279,7 +206,6 @@ def periodic(effects, gait, body, phases, amplitudes):
     "effect", [Transient(travel=0.05), heavy(2.0), DepthProfile(slope=0.2)], ids=repr
 )
 def test_estimates_of_marches_cover_the_truth(effect, truths):
-    """Against four times the phases, with the same elements."""
     parts = {"body": Backbone(30), "effects": (effect,), "gait": Sine(elements=30)}
     scene = SANDFISH.changed(**parts)
     a = np.array([0.12, 0.22, 0.35])
@@ -289,29 +215,7 @@ def test_estimates_of_marches_cover_the_truth(effect, truths):
     off = estimate.pose_distance(found, truth, body_size(scene.system.body))
     error = sum(errors)
     assert (off <= error).all()
-    # One heading may be right by chance.
-    assert (error[:, 0] <= 100 * off[:, 0] + 1e-4).all()
-    assert error[:, 1].max() <= 100 * off[:, 1].max() + 1e-4
-
-
-# Of circles in glass, 64 phases, that stick and slip: the changes with half, a quarter
-# and
-# an eighth of the phases are small by chance. Net poses of 1024 phases.
-LUCKY = {
-    0.4543302326829342: (-0.017186712687, -0.001628653204, -0.011921901768),
-    0.6814122420037888: (-0.038137641698, -0.003901619935, -0.031324130269),
-}
-
-
-def test_errors_cover_stick_and_slip_of_a_heavy_body():
-    body = Chain((0.8286411040705133, 0.6431445619053251, 0.9066951046284145))
-    gait = Circle(centre=(0.3695289476837925, 0.018390673250570422))
-    mass = BodyInertia(1.8664073335775546, 1 / (2 * np.pi), 1.0, 1.0)
-    scene = Scene(Swimmer(GLASS, body, (mass,)), gait)
-    net, error = estimate.direct(scene, gait, np.array([*LUCKY]), 64)
-    off = estimate.pose_distance(net, np.array([*LUCKY.values()]), 1.0)
-    assert (off < error).all()
-    assert (error < 60 * off.max()).all()
+    assert error.max() <= 100 * off.max()
 
 
 def pieced_scene(rng, kind):
@@ -337,7 +241,6 @@ def pieced_scene(rng, kind):
 
 
 def second_cycle(medium, body, gait, effects, pieces, phases, amplitudes):
-    """Poses after the second cycle."""
     scene = Scene(Swimmer(medium, body, effects), gait)
     scene = scene.with_numerics(pieces=pieces, phases=phases, tolerance=1e-9, cycles=2)
     return SceneTables(scene).poses("direct", None, amplitudes)
@@ -370,62 +273,20 @@ def test_estimates_cover_what_pieces_leave_of_many_random_chains():
     of each kind."""
     ratios = []
     for kind in ("transient", "disturbed", "depth"):
-        some = [pieced_scene(np.random.default_rng([7, k]), kind) for k in range(20)]
-        found = [
-            errors_over_estimates(scene, 20, lambda _, compute, *a: compute(*a))
-            for scene in some
-        ]
-        print(
-            f"\n{kind}: {np.median(found):.2f} of the estimate, {np.max(found):.2f} at most"
-        )
-        ratios.append(found)
+        for k in range(20):
+            scene = pieced_scene(np.random.default_rng([7, k]), kind)
+            found = errors_over_estimates(scene, 20, lambda _, compute, *a: compute(*a))
+            ratios.append(found)
+        some = ratios[-20:]
+        print(f"\n{kind}: {np.median(some):.2f} of the estimate, to {np.max(some):.2f}")
     assert np.mean(np.array(ratios) <= 1) >= 0.95
 
 
-def test_a_tolerance_refines_pieces():
-    """Depth that differs along long links, all else being exact enough long before."""
-    depth = (DepthProfile(along=(0.5, 2, 1)),)
-    swimmer = Swimmer(Viscous(2.0), Chain((1, 1.4, 0.8)), depth)
-    scene = Scene(swimmer, Circle(amplitude=1.2)).with_numerics(pieces=5)
-    found = tabled(cheapest_displacements(scene, [1.2], 1e-5))
-    assert found["settings"]["pieces"] > 5
-    truth = SceneTables(scene.with_numerics(pieces=640)).poses("direct", None, [1.2])
-    off = estimate.distance(np.array(found[found["tier"]]), truth)
-    assert off <= found["estimate"][found["tier"]][0] <= 1e-5
-
-
-def test_what_is_left_is_the_sum_of_all_changes_to_come():
-    """Two modes of a massless march, one of either sign, one in heading; the change of
-    each cycle is known."""
-    ratio = np.array([0.5, 0.8])
-    size = np.array([[1.0, 0.0], [0.0, 0.0], [0.0, -2.0]])
-    cycles = limit_cycle.begin(2)
-    for k in range(7):
-        cycles = limit_cycle.after_massless_cycle(cycles, 3.0 + size * ratio**k)
-        if k == 1:  # as much again, as long as no ratio is known
-            change = np.abs(size * (ratio - 1)).max(0)
-            np.testing.assert_allclose(cycles.drift, 2 * change)
-    # Counted from the cycle before.
-    left = np.abs(size).max(0) * ratio**5
-    np.testing.assert_allclose(cycles.drift, left, rtol=1e-12)
-
-
 def test_cells_of_the_ground_do_not_keep_a_march_from_settling():
-    """Changes of displacement as the sandfish's on disturbed ground: they shrink, then
-    come and go at random, sample by sample and in heading most."""
-    rng = np.random.default_rng(2)
-    slow = np.array([0.5, 0.7, 0.8, 0.2, 0.6, 0.3, 0.4])
-    cells = np.array([[0.4e-4], [0.9e-4], [3e-4]])
-    cycles = limit_cycle.begin(7)
-    settled = []
-    for k in range(40):
-        left = 0.02 * slow**k * np.array([[1.0], [-0.5], [0.2]])
-        some = 0.3 + left + cells * rng.normal(size=(3, 7))
-        cycles = limit_cycle.after_massless_cycle(cycles, some)
-        settled.append((cycles.drift <= 1e-3).all())
-        assert k < 2 or (cycles.drift > 0.4 * np.abs(left).max(0) - 2e-4).all(), k
-    assert not any(settled[:10])
-    assert 14 < np.count_nonzero(settled[14:])
+    effects = (DisturbedGround(radius=0.05, weakening=0.3),)
+    shapes = Sine(elements=12).cycle(16, [0.1, 0.3])
+    found = time_steps(GLASS, Backbone(12), *shapes, effects=effects).checked()
+    assert (found.status == "periodic").all()
 
 
 def last_of(cycles, medium, body, gait, phases, effects):
@@ -436,17 +297,11 @@ def last_of(cycles, medium, body, gait, phases, effects):
 
 
 def test_heavy_bodies_know_how_far_they_are(truths):
-    """Plain cycles of a viscous swimmer that forgets slowly: after each, what is left
-    of the way is what is said."""
+    """A viscous swimmer that forgets slowly, against sixty plain cycles."""
     problem = Viscous(2.0), UNEVEN, *HEAVY.cycle(16)
     mass = (heavy(20.0),)
     limit = time_steps(*problem, effects=mass).checked()
     assert limit.cycles < 15
-    for cycles in (8, 12):
-        some = time_steps(*problem, effects=mass, cycles=cycles)
-        off = np.abs(some.displacement - limit.displacement).max()
-        assert off > 1e-5
-        assert some.drift == pytest.approx(off, rel=0.2)
     question = 60, Viscous(2.0), UNEVEN, HEAVY, 16, mass
     *xi, displacement = truths("marches", last_of, *question)
     assert np.abs(limit.displacement - displacement).max() <= limit.drift + 1e-9
@@ -455,7 +310,6 @@ def test_heavy_bodies_know_how_far_they_are(truths):
 
 # Net displacements of 800 plain cycles, by which they change by less than 1e-11.
 FORGETS_SLOWLY = {
-    (0.05, 0.3, 1.8): (-5.864540457e-05, 2.912377523e-05, -8.750617274e-05),
     (0.1, 1.0, 1.8): (-2.23546018e-04, 1.07231935e-04, -3.95975078e-04),
 }
 
@@ -472,43 +326,11 @@ def test_small_strokes_with_a_long_transient_reach_their_limit(case):
 
 
 def test_estimates_hold_what_is_left_of_the_way():
-    """Long before it has settled, as cycles that somebody asks for do not."""
     system = Swimmer(Viscous(2.0), UNEVEN, (heavy(5.0),))
-    scene = Scene(system, HEAVY)
-    left = scene.system.run(*HEAVY.cycle(64)).to_come
-    assert left > 0
-    assert scene.with_numerics(cycles=3).system.run(*HEAVY.cycle(64)).to_come == 0
-    error = estimate.direct(scene, HEAVY, np.array([1.0]), 64)[1]
+    left = system.run(*HEAVY.cycle(32)).to_come
+    error = estimate.direct(Scene(system, HEAVY), HEAVY, np.array([1.0]), 32)[1]
     assert (error >= left).all()
-
-
-def test_a_kick_that_leads_astray_is_taken_back():
-    """Two samples whose velocity halves its way to (1, -1, 2) in a cycle; one of them
-    is thrown about after its first kick. It goes on from the end of its calmest cycle,
-    and both get there."""
-    limit = np.array([[1.0], [-1.0], [2.0]]) * np.ones(2)
-
-    def after(cycles, start, end):
-        cycles = cycles._replace(start=start)
-        return limit_cycle.after_heavy_cycle(cycles, end - limit, end, 0.0)
-
-    x = np.zeros((3, 2))
-    cycles = limit_cycle.after_heavy_cycle(limit_cycle.begin(2), x, x, 0.0)
-    for _ in range(2):
-        cycles = after(cycles, x, (x + limit) / 2)
-        x = (x + limit) / 2
-    kicked = x + cycles.extrapolation
-    np.testing.assert_allclose(kicked, limit, atol=1e-12)
-    wild = limit + [[0.0, 30.0], [0.0, -20.0], [0.0, 10.0]]
-    cycles = after(cycles, kicked, wild)
-    start = wild + cycles.extrapolation
-    np.testing.assert_allclose(start, np.stack([limit[:, 0], x[:, 1]], 1), atol=1e-12)
-    assert cycles.drift[0] <= 0.5 < 10.0 < cycles.drift[1]
-    for _ in range(3):
-        end = (start + limit) / 2
-        cycles = after(cycles, start, end)
-        start = end + cycles.extrapolation
-    np.testing.assert_allclose(start, limit, atol=1e-9)
+    assert left > 0
 
 
 @pytest.mark.parametrize("inertia", [300.0, 400.0])
@@ -520,15 +342,6 @@ def test_no_kick_leads_a_body_astray(inertia):
     assert found.cycles <= 45
     assert np.abs(found.xi).max() < 0.2
     np.testing.assert_allclose(found.displacement[:2], [-0.05785, -0.00554], atol=1e-3)
-
-
-@pytest.mark.parametrize("medium", [GLASS, Viscous(2.0)])
-@pytest.mark.parametrize("inertia", [60.0, 300.0])
-def test_heavy_bodies_settle_in_tens_of_cycles(medium, inertia):
-    shapes = HEAVY.cycle(16, np.linspace(0.3, 1.2, 6))
-    found = time_steps(medium, UNEVEN, *shapes, effects=(heavy(inertia),)).checked()
-    assert found.cycles <= 40
-    assert found.drift.max() <= 1e-6
 
 
 def random_march(rng):

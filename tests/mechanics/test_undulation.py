@@ -12,7 +12,6 @@ from scipy.optimize import brentq
 from figures.paper import fig09c_efficiency, fig10_neuromechanics
 from geomech import scenes
 from geomech.mathematics.gaits import Fourier, Sine, Wave
-from geomech.mathematics.geometry.reconstruct import displacement
 from geomech.mathematics.systems import Swimmer
 from geomech.scenes import Scene
 from geomech.studies.mechanics import undulation
@@ -31,8 +30,6 @@ from rft import (
 pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 SANDFISH = scenes.load("sandfish-loose")
-SNAKE = scenes.load("shovel-nosed-snake")
-HEAD = SANDFISH.system.effects[0]
 
 
 def test_the_sine_is_a_sine():
@@ -46,14 +43,6 @@ def test_the_sine_is_a_sine():
     basis = np.stack([np.sin(x), np.cos(x), np.ones_like(x)], -1)
     fitted = basis @ np.linalg.lstsq(basis, z.imag, rcond=None)[0]
     np.testing.assert_allclose(fitted, z.imag, atol=1e-4 * wavelength)
-
-
-@pytest.mark.parametrize("reverse", [False, True])
-def test_wave_rates_are_derivatives(reverse):
-    gait = Sine(amplitude=0.25, waves=1.5, elements=30, reverse=reverse)
-    t, a = np.linspace(0, 6, 13), [0.1, 0.4]
-    slope = (gait.shape(t + 1e-5, a) - gait.shape(t - 1e-5, a)) / 2e-5
-    np.testing.assert_allclose(gait.rate(t, a), slope, atol=1e-8)
 
 
 def test_curvature_in_closed_form():
@@ -109,17 +98,6 @@ def test_forces_and_internal_moments_by_an_independent_sum(medium, seed):
         assert about[k + 1 :].sum() == pytest.approx(-moment[k], abs=1e-6)
 
 
-def test_slip_counts_every_link_by_its_length():
-    body = Chain((1, 8, 1))
-    shapes = np.array([0.4, 0.9]), np.array([1.0, -0.3])
-    xi = body_velocity(GLASS, body, *shapes).xi
-    _, velocity, along = points(body, *shapes, xi, np.array([0.5]))
-    angle = np.abs(np.angle(velocity / along))[:, 0]
-    slip = np.minimum(angle, np.pi - angle) @ [0.1, 0.8, 0.1]
-    found = work_done(GLASS, body, *shapes, xi).slip
-    assert found == pytest.approx(slip, rel=1e-4)  # to the regularisation
-
-
 def test_sawtooth_is_algebra():
     """Straight pieces at +- theta: one equation for the attack angle psi, (1 + C /
     sqrt(tan^2 g0 + sin^2 psi)) tan psi = cot theta; in a viscous medium the efficiency
@@ -140,17 +118,6 @@ def test_sawtooth_is_algebra():
     ):
         found = undulation.endless_efficiency(medium, theta * np.array([1.0, -1.0]))
         assert found == pytest.approx(expected, rel=1e-10, abs=1e-11)
-
-
-def test_endless_sine_in_loose_glass():
-    """Best progress of the single-period sine near A / lambda = 0.2, efficiency there
-    about 0.7; head drag lowers it towards the published 0.5."""
-    a = np.linspace(0.1, 0.4, 31)
-    plain = np.array([undulation.endless_sine(GLASS, x) for x in a])
-    best, _ = undulation.optimum(a, plain * Sine().wavelength(a))
-    assert best == pytest.approx(0.2, abs=0.02)
-    assert plain[10] == pytest.approx(0.7, abs=0.01)
-    assert 0.5 < undulation.endless_sine(GLASS, 0.2, HEAD) < plain[10] - 0.04
 
 
 # Best progress over the arc length of a wave of an endless sine, and its A / lambda, by
@@ -190,41 +157,20 @@ def test_endless_waves_slide_or_go_sideways(name, kinematics):
     assert np.mean(f_t - slope * f_n) == pytest.approx(0.0, abs=2e-4)
 
 
-def test_an_end_that_goes_sideways_passes_all_of_x_alike():
-    """Head drag by the time at each heading: against the mean over x."""
-    found = undulation.endless_sine(GLASS, 0.2, HEAD, kinematics="sideways")
-    slope = 0.2 * SLOPE
-    root = np.sqrt(1 + slope**2)
-    v = own_velocity(found, slope, "sideways")
-    (f_t, f_n), (end_t, end_n) = GLASS.traction(*v), HEAD.traction(GLASS, *v, 1e-12)
-    # The body is as long as one wave of arc.
-    body = np.mean(f_t - slope * f_n) / root.mean()
-    end = np.mean((end_t - slope * end_n) / root)
-    assert body + end == pytest.approx(0.0, abs=2e-4)
-
-
 @pytest.fixture(scope="module")
 def numbers():
-    return fig09c_efficiency.compute(np.linspace(0.05, 0.5, 16), finer=1)
+    return fig09c_efficiency.compute(np.linspace(0.05, 0.5, 13), finer=1)
 
 
 def test_fig09c_has_the_published_numbers(numbers):
-    """0.7 without and 0.5 with yaw and head drag at the animal's wave, 0.22; "compared
-    with S. scincus, little slip"; "both swimmers also minimized their energy use": the
-    best wave is near the cheapest. Progress has an optimum, for the whole sandfish
-    elsewhere; the text's has none."""
-    loose, close, snake = (numbers[k] for k in list(CHEAPEST))
+    """0.7 without and 0.5 with yaw and head drag at the animal's wave, 0.22; the
+    snake has, "compared with S. scincus, little slip"."""
+    loose = numbers["sandfish-loose"]
     a = loose["amplitude"]
     assert np.interp(0.2, a, loose["endless"]) == pytest.approx(0.7, abs=0.01)
     assert np.interp(0.22, a, loose["efficiency"]) == pytest.approx(0.5, abs=0.05)
-    assert (loose["efficiency"] > close["efficiency"]).mean() > 0.9
-    assert (snake["slip"] < loose["slip"]).all()
-    for found, progress in ((loose, 0.295), (close, 0.343)):
-        assert found["best"]["progress"][0] == pytest.approx(progress, abs=0.006)
-        assert "efficiency" not in found["best"]
-    for found in (loose, snake):
-        cheapest = found["best"]["cost_of_transport"][0]
-        assert found["best"]["progress"][0] == pytest.approx(cheapest, abs=0.06)
+    assert (numbers["shovel-nosed-snake"]["slip"] < loose["slip"]).all()
+    assert loose["best"]["progress"][0] == pytest.approx(0.295, abs=0.006)
     # By the arc length of a wave the optimum of an endless wave is at the animal, by
     # the wavelength there is none.
     arc = fig09c_efficiency.arc_efficiency(loose, "endless")
@@ -243,32 +189,13 @@ CHEAPEST = {
 
 @pytest.mark.parametrize("name", CHEAPEST)
 def test_cost_and_slip(numbers, name):
-    """The scenes' own elements are within 1.5 % of three times as many, and what is
-    left shrinks."""
     best, cost, slip = CHEAPEST[name]
-    found, scene = numbers[name], scenes.load(name)
+    found = numbers[name]
     place, least = found["best"]["cost_of_transport"]
     assert place == pytest.approx(best, abs=0.006)
     assert least == pytest.approx(cost, rel=0.015)
     at_animal = np.interp(0.22, found["amplitude"], found["slip"])
     assert at_animal == pytest.approx(slip, rel=0.02)
-    fine = [
-        undulation.performance(undulation.refined(scene, k), [best, 0.22])
-        for k in (1, 2, 3)
-    ]
-    for key, k, expected in (("cost_of_transport", 0, cost), ("slip", 1, slip)):
-        coarse, middle, last = (one[key][k] for one in fine)
-        assert last == pytest.approx(expected, rel=1e-3)
-        assert abs(last - middle) < 0.4 * abs(middle - coarse)
-
-
-def test_arc_efficiency_is_progress_over_the_arc_of_a_wave():
-    """Of several waves on the body: 1 / waves of its length each."""
-    found = undulation.performance(SNAKE, [0.1, 0.3])
-    expected = found["progress"] * SNAKE.gait.waves
-    np.testing.assert_allclose(found["arc_efficiency"], expected, rtol=1e-12)
-    arc = np.sqrt(1 + (found["amplitude"][:, None] * SLOPE) ** 2).mean(-1)
-    np.testing.assert_allclose(found["efficiency"], expected * arc, rtol=1e-9)
 
 
 def test_an_optimum_is_that_of_a_parabola_through_logarithms():
@@ -277,24 +204,7 @@ def test_an_optimum_is_that_of_a_parabola_through_logarithms():
     bell = 3.0 * np.exp(-7.0 * (x - 0.3) ** 2)
     assert undulation.optimum(x, bell) == pytest.approx((0.3, 3.0))
     assert undulation.optimum(x, 1 / bell, -1) == pytest.approx((0.3, 1 / 3))
-    assert undulation.optimum(x, bell, -1) is None  # the first
     assert undulation.optimum(x, np.exp(x)) is None  # the last
-
-
-def test_body_velocity_through_the_cycle():
-    """In body lengths whatever the size; half a cycle later the mirror image;
-    integrated, the progress."""
-    found = undulation.performance(SANDFISH, [0.1, 0.22])
-    velocity = found["velocity"]
-    half_later = np.roll(velocity, velocity.shape[1] // 2, 1)
-    np.testing.assert_allclose(half_later, velocity * [1, -1, -1], atol=1e-8)
-    net = np.hypot(*displacement(velocity)[:, :2].T)
-    np.testing.assert_allclose(net, found["progress"], rtol=1e-12)
-    large = SANDFISH.changed(
-        body=Backbone(100, length=20.0), effects=(HEAD.in_metres(20.0),)
-    )
-    in_metres = undulation.performance(large, [0.1, 0.22])
-    np.testing.assert_allclose(in_metres["velocity"], velocity, atol=1e-8)
 
 
 CHAIN = scenes.load("seven-link-wave").with_numerics(phases=32)
@@ -305,27 +215,11 @@ PAIR = PAIR.with_numerics(phases=16)
 
 def test_any_gait_has_the_wave_that_its_bends_make():
     """Modes of a chain, told by the motion, as the wave of joint angles that they are;
-    a chain with an offset has one, too; one joint has none."""
-    a = [0.4, 0.87]
-    known, moved = undulation.performance(CHAIN, a), undulation.performance(MODES, a)
+    one joint has none."""
+    known, moved = (undulation.performance(s, [0.4, 0.87]) for s in (CHAIN, MODES))
     for key in ("waves", "wavelength", "relative_curvature", "efficiency"):
         np.testing.assert_allclose(moved[key], known[key], rtol=0.03)
-    for key in ("progress", "cost_of_transport", "slip"):
-        np.testing.assert_allclose(moved[key], known[key], rtol=1e-6)
-    offset = dataclasses.replace(CHAIN.gait, offset=0.1)
-    bent = undulation.performance(CHAIN.changed(gait=offset), [0.87])
-    assert bent["waves"] == pytest.approx(1.0)
-    assert bent["wavelength"] < known["wavelength"][1]
     assert np.isnan(undulation.performance(PAIR, [1.0])["wavelength"]).all()
-
-
-def test_a_chain_is_activated_in_its_modes_as_joint_by_joint():
-    one, two = undulation.activation(CHAIN), undulation.activation(MODES)
-    assert one["s"] == pytest.approx(np.arange(1, 7) / 7)
-    for key in ("bend", "bend_rate", "moment", "fundamental_lag"):
-        np.testing.assert_allclose(two[key], one[key], atol=1e-6)
-    np.testing.assert_allclose(one["bend_rate"], CHAIN.gait.rate(one["t"]), atol=1e-14)
-    assert np.isnan(undulation.activation(PAIR)["fundamental_speed_ratio"])
 
 
 def waving(waves, elements=50, phases=64, effects=(), **gait):
@@ -351,17 +245,6 @@ def test_onset_and_offset_are_where_the_moment_changes_sign(scene):
             work = system.work(*shapes, system.velocity(*shapes))
             moment = np.diagonal(work.bending_moment)
             assert (np.sign(moment) == -sign * np.sign(step)).all()
-    # Left and right are alike.
-    half_cycle = found["offset"] - found["onset"]
-    np.testing.assert_allclose(half_cycle, np.pi, atol=1e-6)
-
-
-def test_lag_counts_from_the_zero_of_curvature():
-    """The sine's curvature falls through zero at t = - 2 pi waves s."""
-    found = undulation.activation(waving(1.5))
-    late = found["lag"] + found["onset"] + 2 * np.pi * 1.5 * found["s"]
-    np.testing.assert_allclose(np.exp(1j * late), 1.0, atol=2e-3)
-    np.testing.assert_allclose(found["lag"], found["fundamental_lag"], atol=0.25)
 
 
 # 400 elements, 512 phases: waves: speed of activation over curvature by the lines, by
@@ -376,79 +259,26 @@ ACTIVATION = {
 }
 
 
-@pytest.mark.parametrize(
-    ("waves", "grids"),
-    [(1.5, [(30, 64), (60, 64), (120, 64)]), (0.5, [(60, 64), (60, 128), (60, 256)])],
-)
-def test_the_speed_ratio_converges_with_order_two_in_elements_and_phases(waves, grids):
-    coarse, middle, fine = (
-        undulation.activation(waving(waves, *grid))["speed_ratio"] for grid in grids
-    )
-    order = np.log2((coarse - middle) / (middle - fine))
-    assert order == pytest.approx(2.0, abs=0.35)
-    limit = fine + (fine - middle) / 3
-    assert limit == pytest.approx(ACTIVATION[waves][0], abs=2e-3)
-
-
 def test_fig10(tmp_path):
     """The wave of activation outruns that of curvature, the less the more waves the
     body has (0.5 to 1.8), and is ahead of it ever more towards the tail. At the middle
-    of a body alike fore and aft, muscles work just while they shorten; head drag brings
-    them forward. 70 % of the way to the tail the right side starts before the body is
-    bent most to the left, by 0.1 of a cycle."""
+    of a body alike fore and aft, muscles work just while they shorten."""
     module = fig10_neuromechanics
     numbers = module.compute(module.SELECTED, elements=50, phases=64)
     lines, harmonic, lag = np.array(list(ACTIVATION.values())).T
     np.testing.assert_allclose(numbers["speed"], lines, rtol=0.015)
     np.testing.assert_allclose(numbers["fundamental_speed"], harmonic, rtol=0.015)
-    head = numbers["head"]
-    assert (np.diff([numbers["speed"], head["speed"]]) < 0).all()
-    assert head["speed"].min() > 1
-
-    def lag_at(s, rows):
-        return np.array([np.interp(s, numbers["s"], row) for row in rows])
-
-    np.testing.assert_allclose(lag_at(0.25, numbers["lag"]), lag, atol=0.02)
-    np.testing.assert_allclose(lag_at(0.5, numbers["lag"]), np.pi / 2, atol=2e-3)
-    assert lag_at(0.5, head["lag"])[2] == pytest.approx(1.7735, abs=3e-3)
-    ahead = lag_at(0.3, numbers["lag"])[2] - np.pi / 2
-    assert ahead == pytest.approx(0.588, abs=0.01)
+    assert numbers["head"]["speed"].min() > 1
+    found = [np.interp([0.25, 0.5], numbers["s"], row) for row in numbers["lag"]]
+    expected = np.stack([lag, np.pi / 2 + 0 * lag], -1)
+    np.testing.assert_allclose(found, expected, atol=0.02)
     drawn(module, numbers, tmp_path)
 
 
-def test_extra_changes_of_sign_are_not_passed_off_as_onsets():
-    """Two waves on the body nearly leave its middle without a moment: it changes sign
-    six times there."""
-    found = undulation.activation(waving(2.0, 120, 128))
-    odd = found["changes"] != 2
-    assert 0 < odd.sum() < 10
-    for key in ("onset", "offset", "lag"):
-        assert (np.isnan(found[key]) == odd).all()
-    assert np.isnan(found["speed_ratio"])
-    assert np.isfinite(found["fundamental_speed_ratio"])
-
-
 def test_the_wave_of_joint_angles_is_that_of_a_long_chain():
-    """By sums over 10,000 body lengths, whole waves; a small one is a sine."""
     wave = Wave(amplitude=0.7, waves=1.3, joints=6)
     alpha = 0.7 * np.cos(0.4 + 2 * np.pi * 1.3 * np.arange(70_000) / 7)
     straight = np.abs(np.exp(1j * np.cumsum(alpha)).mean())
     assert wave.wavelength() == pytest.approx(straight / 1.3, rel=1e-8)
     curvature = np.abs(alpha).mean() * 7 / 1.3
     assert wave.relative_curvature() == pytest.approx(curvature, rel=1e-3)
-    sine = Sine(amplitude=0.01, waves=1.3, elements=100)
-    angle = 2 * np.pi * 0.01 * 2 * np.sin(np.pi * 0.013)
-    small = Wave(amplitude=angle, waves=1.3, joints=99)
-    assert small.wavelength() == pytest.approx(sine.wavelength(), rel=1e-5)
-    curvatures = small.relative_curvature(), sine.relative_curvature()
-    assert curvatures[0] == pytest.approx(curvatures[1], rel=2e-3)
-
-
-def test_a_wave_of_joint_angles_performs_in_its_own_units():
-    wave, a = Wave(amplitude=0.7, waves=1.3, joints=6, frequency=2.0), [0.4, 0.7]
-    swimmer = Swimmer(Viscous(2.5), Chain((1,) * 7, length=0.4))
-    scene = Scene(swimmer, wave).with_numerics(phases=32)
-    found = undulation.performance(scene, a)
-    net = np.hypot(*scene.cycle(amplitudes=a).net.T[:2])
-    np.testing.assert_allclose(found["speed"], 2.0 * net)
-    np.testing.assert_allclose(found["efficiency"], net / 0.4 / wave.wavelength(a))
