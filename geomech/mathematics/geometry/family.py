@@ -68,13 +68,6 @@ class Family:
         """Mean xi_theta (M, 1) of each curve."""
         return self.xi[..., 2].mean(-1, keepdims=True)
 
-    @cached_property
-    def A(self) -> np.ndarray:
-        """A_t in the family's frame, (M, N, 3), with the net turn spread evenly along
-        each curve."""
-        x, y = se2.rotated(self.heading, self.xi[..., 0], self.xi[..., 1])
-        return np.stack([x, y, np.broadcast_to(self._mean_turning, x.shape)], -1)
-
     def _sides(self, values: np.ndarray):
         """Yield (sign, nodes, spline through values (M, ...) in |amplitude|) on each
         side of 0 that has curves."""
@@ -85,24 +78,6 @@ class Family:
             if len(nodes) > 1:
                 sizes = np.abs(self.amplitudes[nodes])
                 yield sign, nodes, make_interp_spline(sizes, values[nodes], 3)
-
-    def ccf(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the shapes (M, N, 2) and the CCF (M, N, 3) per rad^2 of shape space,
-        for maps of a family of two joints; nan where its curves fold.
-
-        The sign is that of `curvature.ccf`: positive for counter-clockwise loops."""
-        t = self.phases
-        unit = self.gait.shape(t, [1.0])[0] - self.gait.shape(t, [0.0])[0]
-        rate = self.gait.rate(t, [1.0])[0]
-        swept = unit[:, 0] * rate[:, 1] - unit[:, 1] * rate[:, 0]
-        jacobian = self.amplitudes[:, None] * swept
-        density = np.zeros_like(self.A)
-        for sign, nodes, spline in self._sides(self.A):
-            density[nodes] = sign * spline.derivative()(np.abs(self.amplitudes[nodes]))
-        small = np.abs(jacobian) < 1e-6 * np.abs(jacobian).max()
-        values = density / np.where(small, 1.0, jacobian)[..., None]
-        values[small] = np.nan
-        return self.gait.shape(t, self.amplitudes), values
 
     def area(self, amplitudes) -> np.ndarray:
         """Return the net pose (..., 3) of a cycle from phase 0, in the body frame at
