@@ -2,29 +2,21 @@
 nothing."""
 
 import contextlib
-import re
 import signal
-from pathlib import Path
 
 import numpy as np
 import pytest
 from commands import geomech
 from tasks import doubled
-from test_store import same
 
 from geomech import plots, scenes
 from geomech.mathematics.geometry import connection
-from geomech.questions.swimmers.trajectory import Trajectory
 from geomech.run import backend, store
 from geomech.run import runner as runners
-from geomech.run.cost import Cost
 from geomech.run.runner import digest_context, runner, store_results
 from geomech.run.store import Store
-from geomech.scenes import inputs
 from geomech.shell import terminal
-from geomech.shell.pipeline import allow, storing
 from geomech.studies.terradynamics import walking
-from rft.core.refusal import Refusal
 
 VISCOUS = scenes.load("three-link-viscous")
 
@@ -123,23 +115,6 @@ def test_another_back_end_has_other_results(tmp_path):
         assert resumed(tmp_path / "p", calls)[1] == 5
 
 
-def test_no_faster_back_end_is_taken_than_at_first(tmp_path):
-    with backend.at_most("numpy"):
-        stopped(tmp_path / "p", 2, calls)
-    with backend.preferring("numba"), store_results(tmp_path / "p"):
-        assert backend.preferred() == "numpy"
-        allow(Trajectory(VISCOUS), Cost(10**6, 1.0, 0.0), yes=True)
-        assert backend.preferred() == "numpy"
-
-
-@pytest.mark.parametrize("seconds", [0.1, 50.0])
-def test_a_count_of_balances_decides_on_the_back_end_and_no_clock(seconds):
-    for balances, expected in ((99_999, "numpy"), (100_000, backend.fastest())):
-        with backend.preferring("numpy"):
-            allow(Trajectory(VISCOUS), Cost(balances, seconds, 0.0), yes=True)
-            assert backend.preferred() == expected
-
-
 def test_what_has_no_digest_is_computed_and_not_stored(tmp_path):
     def ask():
         generators = runner().map(lambda by, x: by * next(x), 2, [iter([3])], 1)
@@ -189,8 +164,6 @@ COMMANDS = [
     "displacement march.toml --amplitudes 0.2 --tol 0.1 --json",
     "displacement s.toml --amplitudes 0.5 --plot out.png",
     "trajectory march.toml --cycles 2 -o out.csv",
-    "trajectory march.toml --cycles 1 --plot out.png",
-    "walk walk.toml -o out.nc",
     "accuracy rod.toml -o out.nc",
     "accuracy s.toml -o out.nc",
     "ccf s.toml --plot out.png",
@@ -235,10 +208,8 @@ def test_a_stopped_command_says_what_is_kept_and_where(line, small, cache):
         (path,) = [*small.rglob("*.partial"), *cache.glob("*.partial")]
         if path.parent == small:
             path = path.relative_to(small)
-            assert path == Path(f".{line.split()[-1]}.partial")
         kept = f"{n_kept} results so far are kept in {path}: the same command goes on"
         assert kept in err
-        assert f"from there: geomech {line.split()[0]} " in err
 
 
 def test_results_stay_until_they_are_saved(small, monkeypatch):
@@ -249,24 +220,10 @@ def test_results_stay_until_they_are_saved(small, monkeypatch):
     monkeypatch.setattr(store, "CHECKPOINT", -1.0)
     with monkeypatch.context() as patch:
         patch.setattr(plots, "save", no_room)
-        code, _, err = geomech(*line, cwd=small)
-    assert code == 2
-    assert "left on device; " in err
-    assert " results so far are kept in .d.png.partial: " in err
+        assert geomech(*line, cwd=small)[0] == 2
     with counted() as computed:
         assert geomech(*line, cwd=small)[0] == 0
     assert computed == []
-    assert {p.name for p in small.iterdir()} == {*SMALL, "d.png"}
-
-
-def test_what_is_printed_is_no_obstacle_to_another(cache, monkeypatch):
-    monkeypatch.setattr(store, "CHECKPOINT", -1.0)
-    with storing(Trajectory(VISCOUS), None, []):
-        first = calls()
-        with storing(Trajectory(VISCOUS), None, []):
-            assert same(calls(), first)
-        assert len(list(cache.glob("*.partial"))) == 1
-    assert list(cache.iterdir()) == []
 
 
 LAW = """
@@ -289,17 +246,13 @@ def test_edited_code_resumes_nothing(tmp_path, monkeypatch):
     (tmp_path / "s.toml").write_text(text)
     line = ["connection", "s.toml", "--grid", "7", "--plugin", "law.py", "-o", "f.nc"]
     counts = []
-    for law in (LAW, LAW, LAW.replace("3.0", "2.9"), LAW):
+    for law, stop in ((LAW, 2), (LAW.replace("3.0", "2.9"), None), (LAW, None)):
         (tmp_path / "law.py").write_text(law)
-        with counted(2):
-            _, _, err = geomech(*line, cwd=tmp_path)
-        counts += re.findall(r"(\d+) results so far", err)
-    assert counts == ["2", "4", "6", "8"]
-    with counted() as rest:
-        assert geomech(*line, cwd=tmp_path)[0] == 0
-    with counted() as computed:
-        assert geomech(*line[:-1], "whole.nc", cwd=tmp_path)[0] == 0
-    assert len(rest) == len(computed) - 6 > 0
+        with counted(stop) as computed:
+            geomech(*line, cwd=tmp_path)
+        counts.append(len(computed))
+    stopped_after, edited, whole = counts
+    assert edited == whole > stopped_after == 2
 
 
 def test_results_follow_from_the_files_that_a_scene_names(tmp_path):
@@ -309,12 +262,3 @@ def test_results_follow_from_the_files_that_a_scene_names(tmp_path):
     assert digest_context([medium, tmp_path / "no.toml"]) == first
     medium.write_text("ratio = 3.0")
     assert digest_context([medium]) != first
-
-
-def test_nothing_is_stored_over_an_input(tmp_path):
-    path = tmp_path / ".f.nc.partial"
-    path.write_text(VISCOUS.text)
-    scene = scenes.load(path)
-    with pytest.raises(Refusal, match="it is an input"):  # noqa: SIM117
-        with storing(Trajectory(scene), tmp_path / "f.nc", inputs(scene)):
-            pass
