@@ -2,14 +2,11 @@
 is checked against the law behind it."""
 
 import math
-import re
 
 import numpy as np
 import pytest
-from commands import geomech
 
 from geomech import scenes as scene
-from geomech.studies.scene_tables import SceneTables
 from rft import CATALOGUE, Chain, Granular, Table, body_velocity
 from rft.core.refusal import Refusal
 from rft.laws.base import require_drag
@@ -72,16 +69,6 @@ def test_a_medium_is_read_from_beside_its_scene(text, medium, folder):
     assert scene.load(file) == found.changed(text=scene.load(file).text)
 
 
-def test_a_scene_is_written_with_the_medium_in_it(folder):
-    found = scene.load(written(folder, FILE, M_toml=MEDIUM))
-    changed = found.with_numerics(grid=9)
-    assert changed.files == found.files != ()
-    for other in (found, changed):
-        again = scene.parse(scene.toml(other))
-        assert (again.system, again.numerics) == (other.system, other.numerics)
-        assert again.files == () and "file" not in scene.toml(other)
-
-
 def test_a_scene_goes_into_the_medium_of_a_file(folder, monkeypatch):
     """What `geomech run --medium` does; from the current folder."""
     table = written(folder, TABLE, REST + GAUSS, M_toml=MEDIUM, T_csv=csv())
@@ -140,17 +127,6 @@ def test_bad_media_get_one_line(name, folder):
     text = str(caught.value)
     assert said in text and "\n" not in text and len(text) < 410, text
     assert text.startswith(f"{file}: "), text
-
-
-def test_outputs_do_not_replace_the_medium(folder):
-    file = written(folder, TABLE, REST + GAUSS, T_csv=csv())
-    for name in ("p.png", "scene.toml"):
-        (folder / name).hardlink_to(folder / "T.csv")
-    out = ("-o", str(folder / "x.nc"), "--plot", str(folder / "p.png"))
-    for args in (("connection", file, *out), ("run", file, "-o", str(folder))):
-        code, _, err = geomech(*args)
-        assert code == 2 and "it is an input" in err
-    assert (folder / "T.csv").read_text() == csv()
 
 
 @pytest.mark.parametrize(
@@ -230,28 +206,3 @@ def test_a_dense_table_is_the_law_it_came_from():
         errors.append((np.abs(drag).max(), np.abs(motion).max()))
     assert (np.array(errors[-1]) < [1e-5, 3e-6]).all()
     assert (np.diff(np.log2(errors), axis=0)[:, 0] < -2.8).all()
-
-
-def test_tiers_and_velocities_of_a_table_are_those_of_its_law(folder):
-    file = written(folder, TABLE, REST + GAUSS, T_csv=csv(count=181))
-    law = '[medium]\nlaw = "granular"\nC = 1.8\ngamma0_deg = 13.8\n'
-    one = SceneTables(scene.load(file))
-    other = SceneTables(scene.parse(law + REST + GAUSS))
-    for tier in ("direct", "path", "area"):
-        expected = other.poses(tier, amplitudes=[0.5, 0.9])
-        found = one.poses(tier, amplitudes=[0.5, 0.9])
-        np.testing.assert_allclose(found, expected, atol=3e-6)
-    assert geomech("explain", file)[0] == 0
-
-
-@pytest.mark.parametrize("inner", ["nowhere.toml", "bad.toml", "to.toml"])
-@pytest.mark.parametrize("name", ["three-link-glass", "c-leg", "xplorer"])
-def test_a_file_within_a_scene_is_refused_with_its_place_once(name, inner, tmp_path):
-    (tmp_path / "bad.toml").write_text("[medium]\nzeta = -1.0\nlaw = 'granular'\n")
-    (tmp_path / "to.toml").write_text('[medium]\nfile = "nowhere.toml"\n')
-    medium = f'[medium]\nfile = "{tmp_path / inner}"\n'
-    text = re.sub(r"\[medium\][^\[]*", medium, scene.load(name).text)
-    with pytest.raises(Refusal, match=r"^scene: \[medium\] ") as caught:
-        scene.parse(text)
-    told = str(caught.value)
-    assert told.count("scene: ") == 1 and "::" not in told

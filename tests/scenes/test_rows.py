@@ -14,8 +14,8 @@ import pytest
 
 from geomech import scenes
 from geomech.core.errors import Note
-from geomech.io import rows, tables
-from geomech.mathematics.gaits import Shchf, frames
+from geomech.io import rows
+from geomech.mathematics.gaits import frames
 from geomech.scenes.data import drag, measurements
 from geomech.scenes.format.columns import columns
 from geomech.scenes.terradynamics import penetration
@@ -314,23 +314,6 @@ def test_one_of_several_animals_is_named(text, tmp_path):
         reader.read(path, individual="c")
 
 
-ONE = deeplabcut({"a": tracks()})
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        (sleap([("", tracks()), ("", tracks() + 9)]), "2 animals without a track"),
-        (ONE.replace("\n0,", "\nlabeled-data/a/i0.png,"), "line 5: .*labelled frames"),
-        (ONE.replace("likelihood", "z"), "three dimensions"),
-    ],
-    ids=["tracks", "frames", "space"],
-)
-def test_tracks_that_are_no_midlines_are_refused(text, said, tmp_path):
-    with pytest.raises(Refusal, match=said):
-        reader.read(written(tmp_path / "d.csv", text))
-
-
 WCON = {"units": {"t": "s", "x": "mm", "y": "mm"}, "data": [{"id": "1", "t": [0.0]}]}
 
 
@@ -361,37 +344,3 @@ def test_files_of_other_programs_are_known(name, raw, said, tmp_path):
     for read in (reader.read, logs.read, drag.read):
         with pytest.raises(Refusal, match=said):
             read(path)
-
-
-def gait_of(path):
-    return Shchf(file=str(path))
-
-
-@pytest.mark.parametrize(
-    ("read", "name", "said"),
-    [
-        (scenes.load, "sysf_a.m", "linklengths.*drag_ratio"),
-        (tables.load, "sysf_a.m", "linklengths.*drag_ratio"),
-        (gait_of, "shchf_circle.m", "XV"),
-    ],
-)
-def test_programs_of_sysplotter_are_no_files_of_theirs(read, name, said, tmp_path):
-    program = f"function output = {name[:-2]}(x)"
-    with pytest.raises(Refusal, match=f"program of MATLAB.*{said}"):
-        read(written(tmp_path / name, program))
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("a,b\n1,2\n2,3\n", "points"),
-        ("1,2\n2,3\n", "no header"),
-        (log_text(["0"]), "--fps belongs to midlines"),
-    ],
-)
-def test_an_option_tells_what_a_file_is(text, said, tmp_path, geomech):
-    """A file whose header does not say is what an option is for; one that cannot be
-    read is refused as that."""
-    path = written(tmp_path / "a.csv", text)
-    code, _, err = geomech("fit-gait", path, "--fps", "30")
-    assert code == 2 and said in err

@@ -7,11 +7,10 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from tabled import tabled
 
 import rft
 from geomech import scenes
-from geomech.mathematics.systems.base import as_system, length_unit
+from geomech.mathematics.systems.base import length_unit
 from geomech.studies.available import default_tiers
 from geomech.studies.scene_tables import SceneTables
 from rft import Chain, Granular
@@ -61,18 +60,6 @@ def test_a_body_of_one_metre_is_no_body_without_a_length(section):
     sizes = ("", f"{key} = 1.0", f"{key} = 2.0")
     units = [length_unit(scenes.parse(text + size).system) for size in sizes]
     assert units == ["BL", "m", "m"]
-
-
-def test_a_class_of_ones_own_is_in_metres_where_it_has_a_length():
-    class Wheel:
-        joints = 1
-
-        def velocity(self, alpha, alphadot):
-            return alphadot[..., :1] * [1.0, 0.0, 0.0]
-
-    assert length_unit(as_system(Wheel())) == "BL"
-    Wheel.length = 1.0
-    assert length_unit(as_system(Wheel())) == "m"
 
 
 def test_every_key_arrives():
@@ -133,13 +120,6 @@ def test_bad_scenes_are_refused_in_one_line(text, said):
     assert len(str(caught.value)) < 450
 
 
-def test_unknown_names_and_files():
-    with pytest.raises(Refusal, match="did you mean 'three-link-glass'"):
-        scenes.load("three-link-glas")
-    with pytest.raises(Refusal, match="cannot read scene 'nowhere.toml': No such file"):
-        scenes.load("nowhere.toml")
-
-
 N = {"loads": "midpoint:3", "regularisation": 1e-2}
 
 
@@ -173,14 +153,6 @@ def test_numerics_reach_marches():
     np.testing.assert_allclose(cycle.net, marched.displacement, atol=1e-12)
     moments = marched.work.bending_moment
     np.testing.assert_allclose(cycle.work.bending_moment, moments, atol=1e-12)
-
-
-def test_the_path_of_a_linear_medium_needs_no_field():
-    viscous = scenes.load("three-link-viscous")
-    table = tabled(SceneTables(viscous).displacements([1.0], ["path", "direct"]))
-    assert "field" not in table["seconds"]
-    assert math.hypot(*table["path"][0][:2]) == pytest.approx(0.0512808243, abs=5e-11)
-    assert table["path"] == table["direct"]
 
 
 def test_four_links_have_an_area_tier_and_two_have_none():

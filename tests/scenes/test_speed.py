@@ -124,13 +124,6 @@ def test_every_displacement_is_a_speed():
     np.testing.assert_allclose(found, 2.5 * answer["net_distance"].values)
 
 
-def test_what_is_nothing_but_its_error_is_zero():
-    result = SceneTables(scenes.parse(CHAIN)).displacements([0.5, 1.0], ["direct"])
-    y = dataclasses.replace(result["y"], values=[[1e-8, -1e-8]], error=[[2e-8, 3e-8]])
-    lines = str(result.with_variables(y)).splitlines()
-    assert "y: zero within its error, 3.0e-08 m" in lines
-
-
 @pytest.mark.parametrize("effects", ["", GRAINS])
 def test_sweeps_give_it(effects):
     """Grains that are pushed aside notice it; without them fast and slow move alike."""
@@ -145,11 +138,6 @@ def test_sweeps_give_it(effects):
     np.testing.assert_allclose(found["speed"], speed)
     alone = SceneTables(scene).displacements([1.0], ["direct"])["speed"].values
     np.testing.assert_allclose(found["speed"][1, 1], alone[0, 0], rtol=1e-6)
-
-
-def test_sweeps_of_what_is_not_timed_have_no_speed():
-    found = sweep(scenes.parse(TIMELESS), {"gait.amplitude": [0.5]})
-    assert "speed" not in found
 
 
 def test_performance_speaks_the_scenes_own_unit():
@@ -171,13 +159,3 @@ def test_performance_speaks_the_scenes_own_unit():
     np.testing.assert_allclose(found["speed_body_lengths"], 30 * distance)
     per_second = plain["velocity"] * [0.1, 0.1, 1.0] * 6 * np.pi
     np.testing.assert_allclose(found["velocity_per_second"], per_second)
-
-
-@pytest.mark.parametrize("top", [0.03, 0.22, 1.0, 1.3247, 2.5, 7.0, 999.0, 1e-5, 4e5])
-def test_amplitudes_of_tables_are_round(top):
-    steps = report.round_amplitudes(top)
-    assert 6 <= len(steps) <= 15
-    assert steps[-1] <= top * (1 + 1e-9) < steps[-1] + 1.01 * steps[0]
-    np.testing.assert_allclose(np.diff(steps), steps[0], rtol=1e-9)
-    mantissa = f"{steps[0]:.3e}".partition("e")[0]
-    assert float(mantissa) in (1.0, 2.0, 2.5, 5.0)
