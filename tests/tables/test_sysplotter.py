@@ -386,23 +386,6 @@ def test_damaged_files_of_version_7_3_are_refused_or_read_as_finite(tmp_path):
             assert np.isfinite(tables.load(path).connection.A).all()
 
 
-@pytest.mark.parametrize(
-    ("place", "in_itself", "said"),
-    [
-        ("s/system_type", False, "has s.system_type in another file"),
-        ("s/B_optimized/self", True, "is damaged at s.B_optimized.self.*: it lies in"),
-    ],
-)
-def test_links_of_version_7_3_are_refused_by_place(place, in_itself, said, tmp_path):
-    h5py = pytest.importorskip("h5py")
-    path = write(tmp_path / "s.mat", 7.3)
-    with h5py.File(path, "r+") as file:
-        file.pop(place, None)
-        file[place] = file["s"] if in_itself else h5py.ExternalLink("/etc/passwd", "/x")
-    with pytest.raises(Refusal, match=said):
-        tables.load(path)
-
-
 # Structs that we write.
 
 

@@ -153,15 +153,6 @@ def test_parts_that_a_netcdf_file_lacks_are_none(tmp_path):
     assert held.metric is held.power_degree is None
 
 
-def test_singular_shapes_leave_no_harmonics_nor_even_part(tmp_path):
-    names = ("A", "fit_residual", "harmonics", "even_part", "A_error")
-    netcdf(tmp_path / "a.nc", masked(*names, **SINGULAR))
-    held = tables.load(tmp_path / "a.nc")
-    assert held.harmonics is held.even is None
-    assert np.argwhere(np.isnan(held.connection.A[0, 0])).tolist() == [[1, 2]]
-    assert np.isnan(held.A_error).sum() == 6
-
-
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -431,44 +422,6 @@ def test_what_a_matlab_file_does_not_state_is_the_usual(tmp_path):
     assert np.isnan(held.connection.residual).all()
     assert (held.unit, held.length, held.sized) == ("BL", 1.0, False)
     assert (held.connection.degree, held.frame) == (3, "that of the table")
-
-
-@pytest.mark.parametrize(
-    ("about", "sized", "degree", "power"),
-    [
-        (
-            {"unit": "m", "length": 0.99e9, "interpolation": 1, "power_degree": 99.0},
-            True,
-            1,
-            99.0,
-        ),
-        (
-            {"unit": "m", "length": 1e9, "interpolation": 4, "power_degree": 100.0},
-            False,
-            3,
-            None,
-        ),
-        (
-            {"unit": "BL", "length": 1.0, "interpolation": 0, "power_degree": 0.0},
-            True,
-            3,
-            None,
-        ),
-        ({"unit": "m", "length": 0.0, "power_degree": 2}, False, 3, None),
-        ({"unit": "m", "length": 2, "frame": 3, "level": "most"}, False, 3, None),
-        ({"unit": "mm", "length": 2.0}, False, 3, None),
-        ([1, 2], False, 3, None),
-    ],
-)
-def test_what_a_matlab_file_states_is_taken_where_it_makes_sense(
-    about, sized, degree, power, tmp_path
-):
-    matlab(tmp_path / "a.mat", about=about)
-    held = tables.load(tmp_path / "a.mat", "+")
-    size = (about["unit"], about["length"]) if sized else ("BL", 1.0)
-    assert (held.sized, held.unit, held.length) == (sized, *size)
-    assert (held.connection.degree, held.power_degree) == (degree, power)
-    assert (held.frame, held.level) == ("that of the table", None)
 
 
 @pytest.mark.parametrize(
