@@ -116,10 +116,8 @@ def cubics(lead, seed, axes=AXES):
     """Return cubics of two angles (*lead, N, M), which splines of degree 3 keep."""
     a, b = np.meshgrid(*axes, indexing="ij")
     powers = np.array([a**0, a, b**2, a * b, a**3, a * b**2])
-    coefficients = []
-    for k in range(np.prod(lead)):
-        coefficients.append(np.random.default_rng(seed + k).normal(size=6))
-    return np.tensordot(np.reshape(coefficients, (*lead, 6)), powers, 1)
+    coefficients = np.random.default_rng(seed).normal(size=(*lead, 6))
+    return np.tensordot(coefficients, powers, 1)
 
 
 def metric(axes):
