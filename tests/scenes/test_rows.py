@@ -105,21 +105,6 @@ def test_sizes_with_a_comma_are_no_metres(size, head, radius, tmp_path):
         assert drag.read(path).sizes["radius"] == pytest.approx(radius)
 
 
-@pytest.mark.parametrize(
-    ("head", "said"),
-    [
-        ("time,joint_1,joint_2,x,y,yaw,theta", "yaw and theta|theta and yaw"),
-        ("time,joint_1_deg,joint_2,x,y,yaw,more", "joint_2 has no unit beside joints"),
-        ("time,t,joint_1,joint_2,x,y,yaw", "time and t may both be the column t"),
-    ],
-)
-def test_columns_of_a_log_that_leave_a_choice_are_refused(head, said, tmp_path):
-    first, *lines = log_text([str(k) for k in range(120)], head).splitlines()
-    text = "\n".join([first, *(f"{line},0" for line in lines)])
-    with pytest.raises(Refusal, match=said):
-        logs.read(written(tmp_path / "log.csv", text))
-
-
 @pytest.mark.parametrize("cell", ["1_5", "１５", "inf", "1,5", "0x1f"])
 def test_cells_that_only_python_takes_for_numbers_are_refused(cell, tmp_path):
     push = written(tmp_path / "push.csv", PLAIN.replace("0.50,", cell + ","))

@@ -308,13 +308,6 @@ def test_parts_of_a_gait_are_where_they_belong(sign, turn, tmp_path):
 UNFIT = (
     "has a gait whose parts do not fit each other: write it anew with 'geomech fit-g"
 )
-ONE_JOINT = {
-    "gait": np.ones((1, 3)),
-    "gait_A": np.ones((3, 1, 5)),
-    "gait_slope": np.ones((3, 1, 0, 5)),
-    "gait_errors": np.ones((1, 3, 1, 1, 5)),
-    "gait_spread": np.ones((1, 1, 3)),
-}
 EVEN = {
     "gait_A": np.ones((3, 2, 4)),
     "gait_slope": np.ones((3, 2, 1, 4)),
