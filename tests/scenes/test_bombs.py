@@ -1,5 +1,5 @@
 """Small files that name the same thing many times, or hold far more than their bytes,
-are refused soon."""
+are refused soon, or read as what they are."""
 
 import io
 import struct

@@ -51,14 +51,14 @@ class Reader:
     """Reader of the nodes of one file, within limits.
 
     bytes_left: that may still be read, inflated. nodes_left: groups, arrays and
-    references that may still be met. values_read: by address in the file, which can name
-    a node many times; a few cells of cells may name one a million times."""
+    references that may still be met. values_read: of the nodes met so far, as a few
+    cells of cells can name one node a million times."""
 
     def __init__(self, file: Any):
         self.file = file
         self.bytes_left = LARGEST
         self.nodes_left = MOST_NODES
-        self.values_read: dict[int, Any] = {}
+        self.values_read: dict[Any, Any] = {}
 
     def member(self, group: Any, name: str, depth: int) -> Any:
         """Return the value of a node in a group; Refusal, with its place, if it cannot
@@ -78,14 +78,11 @@ class Reader:
     def value(self, node: Any, place: str, depth: int) -> Any:
         """Return an array, a text, a cell or a struct; None for anything else.
         depth: of cells and structs that may still lie within."""
-        import h5py
-
         self.nodes_left -= 1
         self._require_nodes(0)
-        address = h5py.h5o.get_info(node.id).addr
-        if address not in self.values_read:
-            self.values_read[address] = self._value(node, place, depth)
-        return self.values_read[address]
+        if node not in self.values_read:
+            self.values_read[node] = self._value(node, place, depth)
+        return self.values_read[node]
 
     def _require_nodes(self, count: int) -> None:
         """Refusal unless ``count`` nodes may still be met."""
@@ -94,6 +91,7 @@ class Reader:
             raise Refusal("is too large, or damaged", because=reason, instead=ANEW)
 
     def _value(self, node: Any, place: str, depth: int) -> Any:
+        """Return the value of a node that is met for the first time."""
         import h5py
 
         if not depth:
