@@ -14,10 +14,7 @@ import rft
 from geomech.io import tables
 from geomech.mathematics.gaits import Circle
 from geomech.mathematics.geometry import connection
-from geomech.mathematics.systems import (
-    Swimmer,
-    Table,
-)
+from geomech.mathematics.systems import IdealFluidSwimmer, Swimmer, Table
 from geomech.scenes import Scene
 from geomech.studies.maps import fields
 from geomech.studies.scene_tables import SceneTables
@@ -419,3 +416,11 @@ def test_an_exported_struct_has_what_its_scripts_read(tmp_path):
     for ending in ("", "_optimized"):
         DA, dA, lb = (np.stack(s[f"{name}{ending}"]) for name in ("DA", "dA", "lb"))
         np.testing.assert_allclose(DA, dA - lb, atol=1e-15)
+
+
+def test_an_exported_metric_of_inertia_is_no_power(tmp_path):
+    source = study(IdealFluidSwimmer()).with_numerics(grid=9, extent=1.0)
+    fields.save_connection(tmp_path / "s.mat", source, layout="struct")
+    held = tables.load(tmp_path / "s.mat")
+    assert held.power_degree is None
+    np.testing.assert_allclose(held.metric.M, source.metric.M)
