@@ -1,7 +1,7 @@
 """Large requests on a Dask cluster on the loopback interface."""
 
+import contextlib
 import os
-import socket
 import subprocess
 import sys
 
@@ -52,47 +52,39 @@ def test_a_cluster_gives_the_digits_of_one_process(address, monkeypatch):
         assert same(REQUESTS["sweep"](), alone)
 
 
-def test_the_command_computes_on_a_cluster(address, tmp_path):
-    for name, option in (("a.nc", "--workers=1"), ("b.nc", f"--scheduler={address}")):
-        assert geomech(*SWEEP, name, option, cwd=tmp_path)[::2] == (0, "")
-    assert (tmp_path / "a.nc").read_bytes() == (tmp_path / "b.nc").read_bytes()
-
-
 def test_errors_of_tasks_are_those_of_the_command(address):
-    with using(scheduler=address), pytest.raises(Refusal, match="no such thing as 2"):
-        list(runner().map(fails, None, range(4), 4))
-    unknown = pytest.raises(Refusal, match="a cluster cannot know what is to be")
-    with using(scheduler=address), unknown:
-        list(runner().map(lambda c, x: x, None, range(4), 4))
+    with using(scheduler=address):
+        with pytest.raises(Refusal, match="no such thing as 2"):
+            list(runner().map(fails, None, range(4), 4))
+        with pytest.raises(Refusal, match="a cluster cannot know what is to be"):
+            list(runner().map(lambda c, x: x, None, range(4), 4))
 
 
 @pytest.fixture
-def processes(tmp_path_factory):
+def processes(tmp_path):
     """A scheduler, and two workers that are processes."""
-    options = ["--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory"]
     env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    with cluster() as local:
+    options = ["--nthreads=1", "--no-nanny", "--no-dashboard"]
+    with cluster() as local, contextlib.ExitStack() as stack:
         line = [sys.executable, "-m", "dask", "worker", local.scheduler_address]
-        line += [*options, tmp_path_factory.mktemp("dask")]
-        pipes = {"env": env, "stderr": subprocess.DEVNULL}
-        both = [subprocess.Popen(line, **pipes) for _ in range(2)]
-        try:
-            yield local, both
-        finally:
-            for process in both:
-                process.kill()
-                process.wait()
+        line += [*options, "--local-directory", tmp_path / "dask"]
+        workers = []
+        for _ in range(2):
+            worker = subprocess.Popen(line, env=env, stderr=subprocess.DEVNULL)
+            stack.callback(worker.wait)
+            stack.callback(worker.kill)
+            workers.append(worker)
+        yield local, workers
 
 
 def test_a_worker_that_is_ended_loses_nothing(processes, tmp_path, monkeypatch):
     """One by SIGKILL; then the other, by a task that ends whoever computes it."""
-    local, both = processes
+    local, workers = processes
     monkeypatch.setattr(executors, "WAIT", 30.0)
     monkeypatch.setattr(executors, "COUNT_INTERVAL", 0.2)
     with using(scheduler=local.scheduler_address):
-        monkeypatch.setattr(executors, "WAIT", 3.0)  # its workers have come
         assert list(runner().map(dies, str(tmp_path), range(8), 8)) == [*range(8)]
-        assert sorted(process.poll() is None for process in both) == [False, True]
+        assert sorted(x.poll() is None for x in workers) == [False, True]
         local.scheduler.allowed_failures = 0
         often = "workers were ended again and again at the same part"
         with pytest.raises(RuntimeError, match=often):
@@ -101,52 +93,30 @@ def test_a_worker_that_is_ended_loses_nothing(processes, tmp_path, monkeypatch):
 
 def test_a_worker_with_other_code_is_refused(address, monkeypatch):
     """Threads share the version; the function that they run tells another."""
-    own = "geomech 9.9, solver 9"
     other = "geomech 9.8, solver 9"
-    monkeypatch.setattr(executors, "VERSION", own)
     monkeypatch.setattr(executors, "_version_and_back_end", lambda: (other, "numpy"))
-    refused = f"has {other}, this command {own}: install the same"
-    with pytest.raises(Refusal, match=refused):
+    with pytest.raises(Refusal, match=f"has {other}, this command "):
         Cluster(address)
 
 
 @pytest.mark.parametrize(
     ("word", "said"),
     [
-        ("tcp://127.0.0.1:{port}", "nothing answers there"),
-        ("127.0.0.1:{port}", "nothing answers there"),
-        ("nonsense", "missing port"),
-        ("http://127.0.0.1:{port}", "unknown address"),
-        ("tcp://127.0.0.1:1;x", "invalid literal"),
+        ("127.0.0.1:1", "nothing answers there"),  # at whose port nobody listens
+        ("http://127.0.0.1:1", "unknown address"),
         ("", "missing port"),
     ],
 )
 def test_a_scheduler_that_is_none_is_one_line(word, said, tmp_path, monkeypatch):
     monkeypatch.setattr(executors, "WAIT", 0.1)
-    with socket.socket() as one:  # at whose port nobody listens
-        one.bind(("127.0.0.1", 0))
-        word = word.format(port=one.getsockname()[1])
-    code, out, err = geomech(*SWEEP, "s.nc", "--scheduler", word, cwd=tmp_path)
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert err.startswith(f"error: --scheduler {word}: ")
+    code, _, err = geomech(*SWEEP, "s.nc", "--scheduler", word, cwd=tmp_path)
+    assert (code, err.count("\n")) == (2, 1)
     assert said in err
-    assert "'dask scheduler'" in err
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_scheduler_that_never_answers_is_one_line(monkeypatch):
-    monkeypatch.setattr(executors, "WAIT", 0.1)
-    with socket.socket() as silent:
-        silent.bind(("127.0.0.1", 0))
-        silent.listen()
-        with pytest.raises(Refusal, match="nothing answers there"):
-            Cluster(f"tcp://127.0.0.1:{silent.getsockname()[1]}")
 
 
 def test_a_cluster_without_workers_is_one_line(monkeypatch):
     monkeypatch.setattr(executors, "WAIT", 0.3)
-    none = pytest.raises(Refusal, match="it has no workers: start some")
-    with cluster() as local, none:
+    with cluster() as local, pytest.raises(Refusal, match="it has no workers: start"):
         Cluster(local.scheduler_address)
 
 
@@ -154,8 +124,3 @@ def test_without_the_package_the_cure_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(Refusal, match="pip install 'geomech.distributed.'"):
         Cluster("tcp://127.0.0.1:1")
-
-
-def test_workers_and_a_scheduler_are_one_too_many():
-    with pytest.raises(Refusal, match="give one of the two"):
-        using(2, "tcp://127.0.0.1:1").__enter__()

@@ -1,6 +1,7 @@
 """Large requests have the same digits wherever they were stopped, whoever computes
 them."""
 
+import contextlib
 import dataclasses
 
 import numpy as np
@@ -13,12 +14,11 @@ from geomech import scenes
 from geomech.mathematics.geometry import connection, metric
 from geomech.mathematics.systems import Solver, Swimmer
 from geomech.run import pending, runner
-from geomech.run.workers import using
+from geomech.run.executors import Processes
 from geomech.studies.displacement import cycles, tiered
-from geomech.studies.estimates import estimate
 from geomech.studies.scene_tables import SceneTables
 from geomech.studies.terradynamics import walking
-from rft import Backbone, BodyInertia, DisturbedGround, Granular, Transient
+from rft import Backbone, BodyInertia, DisturbedGround, Granular
 from rft.terradynamics.walking import engine
 
 GLASS = scenes.load("three-link-glass").with_numerics(grid=5, phases=32, harmonics=3)
@@ -26,7 +26,7 @@ VISCOUS = scenes.load("three-link-viscous").with_numerics(grid=5, phases=32)
 XPLORER = scenes.load("xplorer")
 XPLORER = dataclasses.replace(
     XPLORER,
-    numerics=dataclasses.replace(XPLORER.numerics, steps=8, elements=4, duration=0.3),
+    numerics=dataclasses.replace(XPLORER.numerics, steps=8, elements=4, duration=0.1),
 )
 HEAVY = BodyInertia(mass=0.4, frequency=0.7, length=0.3, drag=2.1)
 DISTURBED = DisturbedGround(weakening=0.6, radius_m=0.024)
@@ -46,18 +46,14 @@ def numbers(result):
 
 def field(scene):
     tables = SceneTables(scene)
-    cost = tables.compute_metric()
-    return [tables.fitted.A, tables.fitted.residual, cost.norm([[0.3, 0.5]], [[1, 2]])]
+    cost = tables.compute_metric().norm([[0.3, 0.5]], [[1, 2]])
+    return [tables.fitted.A, tables.fitted.residual, cost]
 
 
 def search():
     return numbers(
         geomech.optimize(VISCOUS, objective="displacement", harmonics=1, starts=2)
     )
-
-
-def amplitudes():
-    return estimate.direct(GLASS, GLASS.gait, np.array([0.4, 0.9, 1.3]), 32)
 
 
 def march(*effects, cycles=None):
@@ -68,8 +64,7 @@ def march(*effects, cycles=None):
     phase = 2 * np.pi * np.arange(8)[:, None] / 8 - 0.9 * np.arange(body.joints)
     size = np.array([0.5, -0.7])[:, None, None]
     alpha = np.cos(phase) * size + 0.05
-    steps = system.time_steps(alpha, -np.sin(phase) * size, cycles, True, True)
-    return list(steps)
+    return [*system.time_steps(alpha, -np.sin(phase) * size, cycles, True, True)]
 
 
 def walk_with_errors():
@@ -79,10 +74,9 @@ def walk_with_errors():
 
 def walk_in_space():
     pytest.importorskip("mujoco", reason="needs the extra 'mujoco'")
-    walk = engine("mujoco").walk
-    advance = runner.runner().call
-    (walked,) = walk([XPLORER.walker], XPLORER.numerics, 1, advance=advance)
-    return list(walked[:6])
+    given = [XPLORER.walker], XPLORER.numerics, 1
+    (walked,) = engine("mujoco").walk(*given, advance=runner.runner().call)
+    return [*walked[:6]]
 
 
 REQUESTS = {
@@ -94,14 +88,12 @@ REQUESTS = {
     "accuracy of tiers": lambda: numbers(geomech.accuracy(VISCOUS, runs=1)),
     "accuracy of a leg": lambda: numbers(geomech.accuracy("c-leg")),
     "search": search,
-    "amplitudes": amplitudes,
-    "march": lambda: march(Transient(travel_m=0.009)),
     "heavy march": lambda: march(HEAVY),
     "heavy march in disturbed ground": lambda: march(HEAVY, DISTURBED, cycles=3),
     "walk in the plane": walk_with_errors,
     "walk in space": walk_in_space,
 }
-SHARED = ("tasks", "sweep", "dry field", "linear field", "accuracy of tiers", "search")
+SHARED = ("sweep", "dry field", "linear field", "accuracy of tiers", "search")
 
 
 @pytest.fixture(autouse=True)
@@ -113,7 +105,6 @@ def small_parts(monkeypatch):
     monkeypatch.setattr(tiered, "TRUTH_PHASES", 64)
     monkeypatch.setattr(type(scenes.load("c-leg")), "ladder", (4, 8, 16, 32))
     monkeypatch.setattr(cycles, "BATCH_SIZE", 2)
-    monkeypatch.setattr(estimate, "gaits_per_batch", lambda *_: 1)
     for module in (connection, metric):
         monkeypatch.setattr(module, "SAMPLES_TOGETHER", 20)
     monkeypatch.setattr(runner, "CHECKPOINT", -1.0)
@@ -123,20 +114,26 @@ def small_parts(monkeypatch):
 def test_a_stopped_request_resumes_to_the_last_digit(name, tmp_path):
     undisturbed, n_parts = resumed(tmp_path / "whole", REQUESTS[name])
     after = n_parts // 2
-    said = stopped(tmp_path / "p", after, REQUESTS[name])
-    assert said.startswith(f"{after} results so far are kept in {tmp_path / 'p'}: ")
+    stopped(tmp_path / "p", after, REQUESTS[name])
     result, n_rest = resumed(tmp_path / "p", REQUESTS[name])
     assert same(result, undisturbed)
     assert n_rest == n_parts - after > 0
-    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture(scope="module")
+def two():
+    with contextlib.closing(Processes(2)) as executor:
+        yield executor
 
 
 @pytest.mark.parametrize("name", SHARED)
-def test_processes_give_the_digits_of_one_which_resumes(name, tmp_path, monkeypatch):
+def test_processes_give_the_digits_of_one_which_resumes(
+    name, two, tmp_path, monkeypatch
+):
     monkeypatch.setattr(pending, "WORTH_PROCESSES", 0.0)
-    alone = REQUESTS[name]()
-    with using(2):
-        assert same(REQUESTS[name](), alone)
-        assert runner.runner().executor.pool is not None
+    undisturbed = REQUESTS[name]()
+    with runner.use_runner(runner.Runner(executor=two)):
+        assert same(REQUESTS[name](), undisturbed)
+        assert two.pool is not None
         stopped(tmp_path / "p", 2, REQUESTS[name])
-    assert same(resumed(tmp_path / "p", REQUESTS[name])[0], alone)
+    assert same(resumed(tmp_path / "p", REQUESTS[name])[0], undisturbed)

@@ -3,10 +3,8 @@ their writer."""
 
 import contextlib
 import os
-import signal
 import subprocess
 import sys
-import time
 
 import pytest
 
@@ -60,20 +58,11 @@ def paths(folder):
 
 @pytest.mark.parametrize("writer", WRITERS)
 def test_the_next_writer_removes_what_a_kill_left(writer, tmp_path):
-    for name, n_left in (("out", 1), ("out", 1), ("another", 2)):
-        process = start(writer, tmp_path / name, "SIGKILL")
-        assert process.wait() == -signal.SIGKILL
-        assert len(list(tmp_path.glob(".geomech-*"))) == n_left
+    for name in ("out", "out", "another"):
+        start(writer, tmp_path / name, "SIGKILL").wait()
+    assert len(list(tmp_path.glob(".geomech-*"))) == 2
     assert write(writer, tmp_path / "out").read_text() == "new"
     assert len(list(tmp_path.glob(".geomech-*"))) == 1  # of the other target
-
-
-def test_what_a_kill_left_of_a_folder_that_exists_now(tmp_path):
-    start("atomic_folder", tmp_path / "out", "SIGKILL").wait()
-    (tmp_path / "out").mkdir()
-    start("atomic_folder", tmp_path / "out", "SIGKILL").wait()
-    write("atomic_folder", tmp_path / "out")
-    assert [p.name for p in paths(tmp_path)] == ["out", "a.txt"]
 
 
 @pytest.mark.parametrize("writer", WRITERS)
@@ -86,20 +75,13 @@ def test_a_living_writer_keeps_its_folder(writer, tmp_path):
         living.kill()
 
 
-@pytest.fixture
-def left(tmp_path):
-    """The name of a folder that a killed writer of "out" left."""
-    start("atomic_file", tmp_path / "out", "SIGKILL").wait()
-    (folder,) = tmp_path.glob(".geomech-*")
-    return folder
-
-
-def test_what_is_not_ours_stays(left, tmp_path):
+def test_what_is_not_ours_stays(tmp_path):
     """Names like ours, with a mark of something else, none, or behind a link."""
+    start("atomic_file", tmp_path / "out", "SIGKILL").wait()
+    (left,) = tmp_path.glob(".geomech-*")
     real = left.rename(tmp_path / "elsewhere")
     stem = left.name[:-3]
     (tmp_path / f"{stem}link").symlink_to(real)
-    (tmp_path / f"{stem}file").write_text("precious")
     for name, mark in (("other", b"mine"), ("empty", b""), ("none", None)):
         (tmp_path / f"{stem}{name}").mkdir()
         (tmp_path / f"{stem}{name}" / "data").write_text("precious")
@@ -108,17 +90,6 @@ def test_what_is_not_ours_stays(left, tmp_path):
     before = paths(tmp_path)
     write("atomic_file", tmp_path / "out")
     assert paths(tmp_path) == sorted([*before, tmp_path / "out"])
-
-
-def test_an_empty_folder_is_removed_once_it_is_old(left, tmp_path):
-    young = tmp_path / f"{left.name[:-3]}young"
-    young.mkdir()
-    write("atomic_file", tmp_path / "out")
-    assert young.exists()
-    old = time.time() - 2 * files.ABANDONED
-    os.utime(young, (old, old))
-    write("atomic_file", tmp_path / "out")
-    assert paths(tmp_path) == [tmp_path / "out"]
 
 
 @pytest.mark.parametrize("writer", WRITERS)
@@ -151,17 +122,7 @@ def test_a_link_is_written_through(tmp_path):
     (tmp_path / "there").mkdir()
     (tmp_path / "link").symlink_to(tmp_path / "there" / "file")
     write("atomic_file", tmp_path / "link")
-    assert (tmp_path / "link").is_symlink()
     assert (tmp_path / "there" / "file").read_text() == "new"
-
-
-@pytest.mark.parametrize("writer", WRITERS)
-def test_a_folder_goes_where_few_files_can_be_open(writer, tmp_path, monkeypatch):
-    """Where no folder can be opened, `rmtree` ends without a word."""
-    monkeypatch.setattr(files.shutil, "rmtree", lambda *_, **__: None)
-    with pytest.raises(KeyError):
-        write(writer, tmp_path / "out", "half", KeyError)
-    assert paths(tmp_path) == []
 
 
 @pytest.mark.parametrize("make", [os.mkdir, os.mkfifo])
@@ -170,15 +131,6 @@ def test_a_folder_replaces_files_alone(make, tmp_path):
     make(tmp_path / "out" / "a.txt")
     with pytest.raises(Refusal, match=r"a\.txt: it is no ordinary file"):
         write("atomic_folder", tmp_path / "out")
-
-
-def test_a_folder_does_not_replace_an_input(tmp_path):
-    file = write("atomic_folder", tmp_path / "out", "input")
-    (tmp_path / "input").hardlink_to(file)
-    folder = files.atomic_folder(tmp_path / "out", [tmp_path / "input"])
-    with pytest.raises(Refusal, match="it is an input"), folder as new:
-        (new / "a.txt").write_text("new")
-    assert file.read_text() == "input"
 
 
 LISTENERS = []
@@ -221,24 +173,17 @@ def test_a_full_disk_is_named_and_leaves_what_was_there(writer, tmp_path):
     before = paths(tmp_path)
     line = [sys.executable, "-c", LIMITED, writer, tmp_path / "out"]
     said = subprocess.run(line, capture_output=True, text=True).stdout
-    assert said.startswith("cannot write ")
     assert f"{tmp_path / 'out'}: File too large; make room" in said
     assert file.read_text() == "old"
     assert paths(tmp_path) == before
 
 
 @pytest.mark.parametrize("writer", WRITERS)
-@pytest.mark.parametrize("name", ["file/out", "out\0", "loop"])
+@pytest.mark.parametrize("name", ["file/out", "out\0"])
 def test_where_nothing_can_be_written(writer, name, tmp_path):
     (tmp_path / "file").write_text("")
-    (tmp_path / "loop").symlink_to(tmp_path / "loop")
     with pytest.raises(Refusal, match="cannot write"):
         write(writer, tmp_path / name)
-
-
-def test_a_file_in_no_folder_cannot_be_written(tmp_path):
-    with pytest.raises(Refusal, match="cannot write"):
-        write("atomic_file", tmp_path / "missing" / "out")
 
 
 def test_text_is_read_without_its_mark_and_with_one_kind_of_lines(tmp_path):

@@ -2,15 +2,12 @@
 nothing."""
 
 import contextlib
-import re
 import signal
-from pathlib import Path
 
 import numpy as np
 import pytest
 from commands import geomech
 from tasks import doubled
-from test_store import same
 
 from geomech import plots, scenes
 from geomech.mathematics.geometry import connection
@@ -20,11 +17,9 @@ from geomech.run import runner as runners
 from geomech.run.cost import Cost
 from geomech.run.runner import digest_context, runner, store_results
 from geomech.run.store import Store
-from geomech.scenes import inputs
 from geomech.shell import terminal
-from geomech.shell.pipeline import allow, storing
+from geomech.shell.pipeline import allow
 from geomech.studies.terradynamics import walking
-from rft.core.refusal import Refusal
 
 VISCOUS = scenes.load("three-link-viscous")
 
@@ -150,23 +145,18 @@ def test_what_has_no_digest_is_computed_and_not_stored(tmp_path):
     assert resumed(tmp_path / "p", ask) == ([6, 16], 1)
 
 
-def test_long_marches_are_stored_every_two_seconds(tmp_path, monkeypatch):
-    clock = [0.0]
-    monkeypatch.setattr(runners.time, "monotonic", lambda: clock[0])
+def test_marches_are_found_by_what_they_follow_from(tmp_path, monkeypatch):
+    monkeypatch.setattr(runners, "CHECKPOINT", -1.0)
 
-    def step(state):
-        clock[0] += 0.7
-        return state + 1, np.array([state])
+    def march(name):
+        def step(state):
+            return state + 1, np.array([state])
 
-    def march(name="test"):
         return runner().iterate(step, 0, 10, (name,), np.ndarray)
 
-    with counted() as pieces, store_results(tmp_path / "p", keep=True) as request:
-        assert march() == (10, [np.array([k]) for k in range(10)])
-        assert [len(rows) for _, rows in pieces] == [3, 3, 3, 1]
-        assert len(request.store.new) <= 1
-    assert resumed(tmp_path / "p", march, keep=True)[1] == 0
-    assert resumed(tmp_path / "p", lambda: march("other"))[1] == 4
+    for name, n_computed in (("one", 10), ("one", 0), ("other", 10)):
+        found = resumed(tmp_path / "p", lambda: march(name), keep=True)
+        assert found == ((10, [np.array([k]) for k in range(10)]), n_computed)
 
 
 # Commands
@@ -186,17 +176,13 @@ SMALL = {
     "s.toml": VISCOUS.text + "[numerics]\nphases = 64\ngrid = 9\n",
 }
 SWEEP = "--over medium.ratio=2,3 --over gait.amplitude=0.2:1:80"
-SEARCH = "--objective displacement --starts 3 --harmonics 1 --workers 1"
 COMMANDS = [
     "displacement march.toml --amplitudes 0.2 --tol 0.1 --json",
     "displacement s.toml --amplitudes 0.5 --plot out.png",
     "trajectory march.toml --cycles 2 -o out.csv",
-    "trajectory march.toml --cycles 1 --plot out.png",
-    "walk walk.toml -o out.nc",
     "accuracy rod.toml -o out.nc",
     "accuracy s.toml -o out.nc",
     "ccf s.toml --plot out.png",
-    f"optimize s.toml {SEARCH} -o out.toml",
     "run s.toml -o out",
     f"sweep s.toml {SWEEP} -o out.nc",
     "sweep walk.toml --over robot.mass=0.1:0.2:9 -o out.nc",
@@ -237,10 +223,8 @@ def test_a_stopped_command_says_what_is_kept_and_where(line, small, cache):
         (path,) = [*small.rglob("*.partial"), *cache.glob("*.partial")]
         if path.parent == small:
             path = path.relative_to(small)
-            assert path == Path(f".{line.split()[-1]}.partial")
         kept = f"{n_kept} results so far are kept in {path}: the same command goes on"
         assert kept in err
-        assert f"from there: geomech {line.split()[0]} " in err
 
 
 def test_results_stay_until_they_are_saved(small, monkeypatch):
@@ -251,24 +235,10 @@ def test_results_stay_until_they_are_saved(small, monkeypatch):
     monkeypatch.setattr(store, "CHECKPOINT", -1.0)
     with monkeypatch.context() as patch:
         patch.setattr(plots, "save", no_room)
-        code, _, err = geomech(*line, cwd=small)
-    assert code == 2
-    assert "left on device; " in err
-    assert " results so far are kept in .d.png.partial: " in err
+        assert geomech(*line, cwd=small)[0] == 2
     with counted() as computed:
         assert geomech(*line, cwd=small)[0] == 0
     assert computed == []
-    assert {p.name for p in small.iterdir()} == {*SMALL, "d.png"}
-
-
-def test_what_is_printed_is_no_obstacle_to_another(cache, monkeypatch):
-    monkeypatch.setattr(store, "CHECKPOINT", -1.0)
-    with storing(Trajectory(VISCOUS), None, []):
-        first = calls()
-        with storing(Trajectory(VISCOUS), None, []):
-            assert same(calls(), first)
-        assert len(list(cache.glob("*.partial"))) == 1
-    assert list(cache.iterdir()) == []
 
 
 LAW = """
@@ -291,32 +261,18 @@ def test_edited_code_resumes_nothing(tmp_path, monkeypatch):
     (tmp_path / "s.toml").write_text(text)
     line = ["connection", "s.toml", "--grid", "7", "--plugin", "law.py", "-o", "f.nc"]
     counts = []
-    for law in (LAW, LAW, LAW.replace("3.0", "2.9"), LAW):
+    for law, stop in ((LAW, 2), (LAW.replace("3.0", "2.9"), None), (LAW, None)):
         (tmp_path / "law.py").write_text(law)
-        with counted(2):
-            _, _, err = geomech(*line, cwd=tmp_path)
-        counts += re.findall(r"(\d+) results so far", err)
-    assert counts == ["2", "4", "6", "8"]
-    with counted() as rest:
-        assert geomech(*line, cwd=tmp_path)[0] == 0
-    with counted() as computed:
-        assert geomech(*line[:-1], "whole.nc", cwd=tmp_path)[0] == 0
-    assert len(rest) == len(computed) - 6 > 0
+        with counted(stop) as computed:
+            geomech(*line, cwd=tmp_path)
+        counts.append(len(computed))
+    stopped_after, edited, whole = counts
+    assert edited == whole > stopped_after == 2
 
 
 def test_results_follow_from_the_files_that_a_scene_names(tmp_path):
     medium = tmp_path / "m.toml"
     medium.write_text("ratio = 2.0")
     first = digest_context([medium])
-    assert digest_context([medium, tmp_path / "no.toml"]) == first
     medium.write_text("ratio = 3.0")
     assert digest_context([medium]) != first
-
-
-def test_nothing_is_stored_over_an_input(tmp_path):
-    path = tmp_path / ".f.nc.partial"
-    path.write_text(VISCOUS.text)
-    scene = scenes.load(path)
-    with pytest.raises(Refusal, match="it is an input"):  # noqa: SIM117
-        with storing(Trajectory(scene), tmp_path / "f.nc", inputs(scene)):
-            pass

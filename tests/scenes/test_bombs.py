@@ -1,6 +1,7 @@
 """Small files that name the same thing many times, or hold far more than their bytes,
-are refused soon."""
+are refused soon, or read as what they are."""
 
+import io
 import struct
 import zlib
 
@@ -10,7 +11,7 @@ import pytest
 from geomech import scenes
 from geomech.io import tables
 from geomech.io.rows import split_unit
-from geomech.io.tables import matlab
+from geomech.io.tables import hdf5, matlab
 from geomech.scenes.format.hints import line_hint
 from rft.core.refusal import Refusal
 
@@ -26,21 +27,19 @@ def mat(compressed):
     return head + struct.pack("<II", matlab.COMPRESSED, len(body)) + body
 
 
-def test_cells_of_cells_of_version_7_3(tmp_path):
-    """Each of a few cells has the next one eight times."""
+def test_cells_of_cells_of_version_7_3():
+    """Each of a few cells has the next one eight times: each is read once."""
     h5py = pytest.importorskip("h5py")
-    with h5py.File(tmp_path / "s.mat", "w", userblock_size=512) as file:
+    raw = io.BytesIO()
+    with h5py.File(raw, "w") as file:
         node = file.create_dataset("end", data=np.zeros((1, 1)))
         for k in range(12):
             references = np.full((8, 1), node.ref, h5py.ref_dtype)
             node = file.create_dataset(f"c{k}", data=references, dtype=h5py.ref_dtype)
             node.attrs["MATLAB_class"] = np.bytes_("cell")
         file["s"] = node
-    raw = (tmp_path / "s.mat").read_bytes()
-    head = b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM"
-    (tmp_path / "s.mat").write_bytes(head + raw[128:])
-    with pytest.raises(Refusal, match="cells and fields"):
-        tables.load(tmp_path / "s.mat")
+    cells = hdf5.arrays(raw.getvalue(), ["s"])["s"]
+    assert [cell is cells[0, 0] for cell in cells.ravel()] == [True] * 8
 
 
 def test_many_empty_cells_of_version_5():
@@ -75,14 +74,9 @@ def test_variables_of_netcdf_in_one_place(tmp_path):
 @pytest.mark.parametrize(
     "key", ["a" + ".a" * 5000, '"a" . ' * 5000 + "a", "[a" + ".a" * 5000 + "]"]
 )
-def test_keys_of_many_parts(key, tmp_path):
-    for text in (f"{key} = 1\n", f"{key}\n"):
-        with pytest.raises(Refusal, match="64 parts"):
-            scenes.parse(text)
-        (tmp_path / "m.toml").write_text(text)
-        medium = f"[medium]\nfile = '{tmp_path}/m.toml'\n[body]\nkind = 'chain'\n"
-        with pytest.raises(Refusal, match="64 parts"):
-            scenes.parse(medium + "[gait]\nkind = 'circle'\n")
+def test_keys_of_many_parts(key):
+    with pytest.raises(Refusal, match="64 parts"):
+        scenes.parse(f"{key} = 1\n")
 
 
 def test_patterns_take_a_time_of_the_length():

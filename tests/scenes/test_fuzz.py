@@ -105,9 +105,7 @@ def outcome(text):
         return "run"
     except ValueError as error:
         message = str(error)
-        assert message
-        assert "\n" not in message
-        assert len(message) < 450
+        assert message and "\n" not in message and len(message) < 450
         return "refused"
 
 

@@ -2,17 +2,13 @@
 is checked against the law behind it."""
 
 import math
-import re
 
 import numpy as np
 import pytest
-from commands import geomech
 
 from geomech import scenes as scene
-from geomech.studies.scene_tables import SceneTables
-from rft import CATALOGUE, Chain, Granular, Table, body_velocity
+from rft import CATALOGUE, Granular, Table
 from rft.core.refusal import Refusal
-from rft.laws.base import require_drag
 
 pytestmark = pytest.mark.usefixtures("fastest")
 
@@ -72,62 +68,39 @@ def test_a_medium_is_read_from_beside_its_scene(text, medium, folder):
     assert scene.load(file) == found.changed(text=scene.load(file).text)
 
 
-def test_a_scene_is_written_with_the_medium_in_it(folder):
-    found = scene.load(written(folder, FILE, M_toml=MEDIUM))
-    changed = found.with_numerics(grid=9)
-    assert changed.files == found.files != ()
-    for other in (found, changed):
-        again = scene.parse(scene.toml(other))
-        assert (again.system, again.numerics) == (other.system, other.numerics)
-        assert again.files == () and "file" not in scene.toml(other)
-
-
 def test_a_scene_goes_into_the_medium_of_a_file(folder, monkeypatch):
     """What `geomech run --medium` does; from the current folder."""
-    table = written(folder, TABLE, REST + GAUSS, M_toml=MEDIUM, T_csv=csv())
+    table = written(folder, TABLE, M_toml=MEDIUM, T_csv=csv())
     monkeypatch.chdir(folder)
-    glass = scene.load("three-link-glass").with_numerics(loads="gauss:12")
+    glass = scene.load("three-link-glass")
     own = scene.in_medium(glass, "M.toml")
     assert own == glass.changed(medium=WRITTEN)
     assert scene.inputs(own) == [folder / "M.toml"]
     assert scene.parse(scene.toml(own)).system == own.system  # not the built-in text
     medium = scene.in_medium(glass, "T.csv").system.medium
     assert medium == scene.load(table).system.medium
-    with pytest.raises(Refusal, match="a no-slip-snake takes no medium"):
-        scene.in_medium(scene.load("no-slip-snake"), "M.toml")
 
 
 BAD = {
     "no such file": (FILE, {}, "cannot read 'M.toml': No such file"),
-    "a folder": ('file = "."', {}, "ordinary file"),
     "no name": ('file = 3', {}, 'give text in "quotes" in place of 3'),
-    "extra": (FILE + "\nC = 2.0", {"M_toml": MEDIUM}, "key: 'C' is unknown: use one of file"),
     "no TOML": (FILE, {"M_toml": "C = "}, "M.toml is not TOML"),
-    "no text": (FILE, {"M_toml": b"\xff\xfe\x00"}, "it is not text"),
     "deep": (FILE, {"M_toml": "a = " + "[" * 5000}, "is not TOML"),
     "huge": (FILE, {"M_toml": MEDIUM + "#" * 1_000_001}, "larger than 1 MB"),
     "a CSV": ('file = "T.csv"', {"T_csv": csv()}, 'add law = "table"'),
     "a scene": (FILE, {"M_toml": MEDIUM + REST}, "must hold one table [medium] and nothing else"),
     "no medium": (FILE, {"M_toml": "x = 1"}, "names no medium"),
-    "no table": (FILE, {"M_toml": "medium = 1"}, "must hold one table [medium]"),
-    "itself": (FILE, {"M_toml": '[medium]\nfile = "M.toml"'}, "names no medium"),
     "wrong key": (FILE, {"M_toml": MEDIUM.replace("C =", "c =")}, "key: 'c' is unknown"),
-    "wrong value": (FILE, {"M_toml": MEDIUM.replace("1.4", '"x"')}, "C"),
     "covariance": (FILE, {"M_toml": MEDIUM.replace("0.02,", "-0.02,")}, "covariance must be symmetric"),
     "table without": ('law = "table"', {}, "[medium]"),
     "table with": (TABLE + "\nf_t = [1]", {"T_csv": csv()}, "give either 'file' or 'psi', 'f_t', 'f_n'"),
-    "no such table": (TABLE, {}, "No such file"),
     "columns": (TABLE, {"T_csv": csv("psi_deg,f_t,lift")}, "T.csv, line 2: the header has no column f_n"),
     "nan": (TABLE, {"T_csv": csv().replace("90.0,", "nan,")}, "T.csv, line 15: a row must be 3 finite numbers"),
-    "short row": (TABLE, {"T_csv": csv().replace("82.5,", "82.5 ")}, "T.csv, line 14: a row must be 3"),
     "swapped": (TABLE, {"T_csv": csv("psi_deg,f_n,f_t")}, "the columns are exchanged"),
     "radians": (TABLE, {"T_csv": csv("psi,f_t,f_n").replace("psi,", "psi_deg,")}, "look like radians"),
-    "degrees": (TABLE, {"T_csv": csv().replace("psi_deg,", "psi,")}, "write psi_deg for degrees"),
-    "few": (TABLE, {"T_csv": "psi_deg,f_t,f_n\n0,1,0\n90,0,3\n"}, "rows of 3 to"),
     "half": (TABLE, {"T_csv": "psi_deg,f_t,f_n\n0,1,0\n20,1,1\n40,1,2\n60,0.4,2\n"}, "within 15 degrees of 0 and of 90"),
     "pushes": (TABLE, {"T_csv": csv() + "45,-9,1\n"}, "pushes"),
     "no drag": (TABLE, {"T_csv": "psi_deg,f_t,f_n\n0,0,0\n45,0,0\n90,0,0\n"}, "there is no drag"),
-    "not text": (TABLE, {"T_csv": b"\x89PNG\x00\xff"}, "it is not text"),
 }  # fmt: skip
 
 
@@ -138,19 +111,7 @@ def test_bad_media_get_one_line(name, folder):
     with pytest.raises(Refusal) as caught:
         scene.load(file)
     text = str(caught.value)
-    assert said in text and "\n" not in text and len(text) < 410, text
-    assert text.startswith(f"{file}: "), text
-
-
-def test_outputs_do_not_replace_the_medium(folder):
-    file = written(folder, TABLE, REST + GAUSS, T_csv=csv())
-    for name in ("p.png", "scene.toml"):
-        (folder / name).hardlink_to(folder / "T.csv")
-    out = ("-o", str(folder / "x.nc"), "--plot", str(folder / "p.png"))
-    for args in (("connection", file, *out), ("run", file, "-o", str(folder))):
-        code, _, err = geomech(*args)
-        assert code == 2 and "it is an input" in err
-    assert (folder / "T.csv").read_text() == csv()
+    assert text.startswith(f"{file}: ") and said in text
 
 
 @pytest.mark.parametrize(
@@ -160,10 +121,10 @@ def test_outputs_do_not_replace_the_medium(folder):
 def test_a_table_is_read_from_any_of_its_columns(columns, folder):
     file = written(folder, TABLE, REST + GAUSS, T_csv=csv(columns))
     found = scene.load(file)
+    medium = found.system.medium
     expected = Table(*rows(13))
-    np.testing.assert_allclose(found.system.medium.f_n, expected.f_n, rtol=1e-12)
-    np.testing.assert_allclose(found.system.medium.f_t, expected.f_t, rtol=1e-12)
-    assert scene.inputs(found) == [file, folder / "T.csv"]
+    np.testing.assert_allclose(medium.f_n, expected.f_n, rtol=1e-12)
+    np.testing.assert_allclose(medium.f_t, expected.f_t, rtol=1e-12)
     again = scene.parse(scene.toml(found))  # the numbers stand in it
     assert again.system == found.system and again.files == ()
 
@@ -171,8 +132,6 @@ def test_a_table_is_read_from_any_of_its_columns(columns, folder):
 def test_the_medium_of_a_file_may_name_a_table_in_another(folder):
     medium = f"[medium]\n{TABLE}"
     found = scene.load(written(folder, FILE, REST + GAUSS, M_toml=medium, T_csv=csv()))
-    direct = scene.load(written(folder, TABLE, REST + GAUSS, "direct.toml"))
-    assert found.system == direct.system
     assert scene.inputs(found)[1:] == [folder / "M.toml", folder / "T.csv"]
 
 
@@ -202,56 +161,20 @@ def test_a_table_does_not_overshoot():
     assert (rises * steps >= -1e-12)[row[1:] == row[:-1]].all()
 
 
-def test_rows_measured_again_are_averaged_and_must_be_finite():
+def test_rows_measured_again_are_averaged():
     again = [*PSI, PSI[2], 2 * np.pi - PSI[3]]
     table = Table(again, [*F_T, 0.6, 0.5], [*F_N, 1.3, 1.4])
     found = np.array(table.traction(np.cos(PSI[2:4]), np.sin(PSI[2:4])))
     np.testing.assert_allclose(0.5 * found, [[0.5, 0.4], [1.1, 1.3]], rtol=1e-12)
-    with pytest.raises(ValueError, match="f_n must be finite"):
-        Table(PSI, F_T, [*F_N[:-1], np.inf])
 
 
 def test_a_dense_table_is_the_law_it_came_from():
-    """Drag, and body velocities by the same quadrature; of order 3 in the spacing."""
-    alpha, alphadot = np.random.default_rng(4).uniform(-1.5, 1.5, (2, 40, 2))
+    """To order 3 in the spacing."""
     fine = np.linspace(-np.pi, np.pi, 999)
     v = np.cos(fine), np.sin(fine)
-    given = Chain((1, 1.4, 0.8), frame="link-1"), alpha, alphadot
-    want = body_velocity(LOOSE, *given, loads="gauss:16")
     errors = []
     for count in (46, 91, 181):
-        table = Table(*rows(count))
-        require_drag(table)
-        drag = np.subtract(table.traction(*v), LOOSE.traction(*v))
-        found = body_velocity(table, *given, loads="gauss:16")
-        sliding = (want.status == "sliding") & (found.status == "sliding")
-        assert sliding.sum() > 30 and not (found.status == "unconverged").any()
-        motion = (found.xi - want.xi)[sliding]
-        errors.append((np.abs(drag).max(), np.abs(motion).max()))
-    assert (np.array(errors[-1]) < [1e-5, 3e-6]).all()
-    assert (np.diff(np.log2(errors), axis=0)[:, 0] < -2.8).all()
-
-
-def test_tiers_and_velocities_of_a_table_are_those_of_its_law(folder):
-    file = written(folder, TABLE, REST + GAUSS, T_csv=csv(count=181))
-    law = '[medium]\nlaw = "granular"\nC = 1.8\ngamma0_deg = 13.8\n'
-    one = SceneTables(scene.load(file))
-    other = SceneTables(scene.parse(law + REST + GAUSS))
-    for tier in ("direct", "path", "area"):
-        expected = other.poses(tier, amplitudes=[0.5, 0.9])
-        found = one.poses(tier, amplitudes=[0.5, 0.9])
-        np.testing.assert_allclose(found, expected, atol=3e-6)
-    assert geomech("explain", file)[0] == 0
-
-
-@pytest.mark.parametrize("inner", ["nowhere.toml", "bad.toml", "to.toml"])
-@pytest.mark.parametrize("name", ["three-link-glass", "c-leg", "xplorer"])
-def test_a_file_within_a_scene_is_refused_with_its_place_once(name, inner, tmp_path):
-    (tmp_path / "bad.toml").write_text("[medium]\nzeta = -1.0\nlaw = 'granular'\n")
-    (tmp_path / "to.toml").write_text('[medium]\nfile = "nowhere.toml"\n')
-    medium = f'[medium]\nfile = "{tmp_path / inner}"\n'
-    text = re.sub(r"\[medium\][^\[]*", medium, scene.load(name).text)
-    with pytest.raises(Refusal, match=r"^scene: \[medium\] ") as caught:
-        scene.parse(text)
-    told = str(caught.value)
-    assert told.count("scene: ") == 1 and "::" not in told
+        drag = np.subtract(Table(*rows(count)).traction(*v), LOOSE.traction(*v))
+        errors.append(np.abs(drag).max())
+    assert errors[-1] < 1e-5
+    assert (np.diff(np.log2(errors)) < -2.8).all()

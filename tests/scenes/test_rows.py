@@ -12,11 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geomech import scenes
 from geomech.core.errors import Note
-from geomech.io import rows, tables
-from geomech.mathematics.gaits import Shchf, frames
-from geomech.scenes.data import drag, measurements
+from geomech.io import rows
+from geomech.mathematics.gaits import frames
+from geomech.scenes.data import drag
 from geomech.scenes.format.columns import columns
 from geomech.scenes.terradynamics import penetration
 from geomech.studies.measured import log as logs
@@ -86,8 +85,6 @@ def test_a_table_in_any_form_has_the_same_numbers_and_one_note(form, tmp_path):
     assert len(notes) == bool(told)
     for note in notes:
         assert re.search(f"(?s)^push.csv: .*{told}", str(note.message))
-    if form == "logger":
-        assert test.area[0] == pytest.approx(np.pi * 0.02**2)
 
 
 @pytest.mark.parametrize(
@@ -108,40 +105,11 @@ def test_sizes_with_a_comma_are_no_metres(size, head, radius, tmp_path):
         assert drag.read(path).sizes["radius"] == pytest.approx(radius)
 
 
-@pytest.mark.parametrize(
-    ("head", "said"),
-    [
-        ("time,joint_1,joint_2,x,y,yaw,theta", "yaw and theta|theta and yaw"),
-        ("time,joint_1_deg,joint_2,x,y,yaw,more", "joint_2 has no unit beside joints"),
-        ("time,t,joint_1,joint_2,x,y,yaw", "time and t may both be the column t"),
-    ],
-)
-def test_columns_of_a_log_that_leave_a_choice_are_refused(head, said, tmp_path):
-    first, *lines = log_text([str(k) for k in range(120)], head).splitlines()
-    text = "\n".join([first, *(f"{line},0" for line in lines)])
-    with pytest.raises(Refusal, match=said):
-        logs.read(written(tmp_path / "log.csv", text))
-
-
-@pytest.mark.parametrize(
-    ("cell", "place"),
-    [
-        ("1_5", "line 3, column|line 3: a row"),
-        ("１５", "line 3"),  # digits of another script
-        ("inf", "line 3"),
-        ("1,5", "line 3"),
-        ("0x1f", "line 3"),
-    ],
-)
-def test_cells_that_only_python_takes_for_numbers_are_refused(cell, place, tmp_path):
+@pytest.mark.parametrize("cell", ["1_5", "１５", "inf", "1,5", "0x1f"])
+def test_cells_that_only_python_takes_for_numbers_are_refused(cell, tmp_path):
     push = written(tmp_path / "push.csv", PLAIN.replace("0.50,", cell + ","))
-    with pytest.raises(Refusal, match=place):
+    with pytest.raises(Refusal, match="line 3"):
         penetration.read(rows.read(push, 10_000, ""))
-    head = "t," + ",".join(f"x{p},y{p}" for p in range(5))
-    lines = [f"{t},1,2,3,4,5,6,7,8,9,10" for t in range(15)]
-    lines[1] = lines[1].replace("1,1,", f"1,{cell},", 1)
-    with pytest.raises(Refusal, match="t.csv, line 3"):
-        reader.read(written(tmp_path / "t.csv", "\n".join([head, *lines])))
 
 
 @pytest.mark.parametrize(
@@ -188,13 +156,10 @@ def test_paths_and_plates_take_units_behind_names(text, needed, angles, row, tmp
 
 
 @pytest.mark.filterwarnings("ignore::geomech.core.errors.Note")
-def test_drag_displacements_and_midlines_take_units_behind_names(tmp_path):
+def test_drag_and_midlines_take_units_behind_names(tmp_path):
     rod = "psi (rad);F_par (mN);F_perp (mN)\n0;470;30\n1,5;9;1408\n"
     found = drag.read(written(tmp_path / "rod.csv", rod)).rows[:3].T
     np.testing.assert_allclose(found[1], [np.degrees(1.5), 0.009, 1.408])
-    data = written(tmp_path / "d.csv", "amplitude (deg);value\n90;0,1\n")
-    scene = scenes.load("three-link-viscous")
-    assert measurements.read(data, scene)["value"][0] == 0.1
     points = [f"{t};{k};{t * k},5" for t in range(4) for k in range(4)]
     bends = "\n".join(["t (ms);x_mm;y_mm", *points])
     read = frames.read(written(tmp_path / "b.csv", bends))
@@ -230,7 +195,6 @@ def test_times_since_1970_are_counted_from_the_first_row(scale, head, told, tmp_
     with pytest.warns(Note, match=told):
         log = logs.read(written(tmp_path / "log.csv", text))
     np.testing.assert_allclose(log.t, after, rtol=1e-12)
-    assert log.seconds
 
 
 ROS = "%time,field.position0,field.position1,field.pose.x,field.pose.y,field.pose.theta"
@@ -240,9 +204,6 @@ def test_a_log_of_ros_is_read_by_its_columns_and_words_beside_them(tmp_path):
     times = [str(1506356466 * 10**9 + k * 10**7) for k in range(120)]
     lines = log_text(times, ROS).replace("\n", ",/world\n")
     path = written(tmp_path / "echo.csv", lines.replace("/world", "frame_id", 1))
-    told = r"no column x: it has '.*field\.pose\.x.*columns"
-    with pytest.raises(Refusal, match=told):
-        logs.read(path)
     with pytest.warns(Note, match="ns since 1970"):
         log = logs.read(path, ROS.split(","))
     assert log.t[1] == 0.01 and log.joints == ("field.position0", "field.position1")
@@ -282,15 +243,13 @@ def deeplabcut(individuals: dict[str, np.ndarray | None], score: float = 0.97) -
     return "\n".join(",".join(line) for line in (*heads, *lines))
 
 
-def test_individuals_without_points_are_left_out_unless_named(tmp_path):
+def test_individuals_without_points_are_left_out(tmp_path):
     dish = np.broadcast_to([[40.0, 50.0], [640.0, 50.0]], (15, 2, 2))
     text = deeplabcut({"worm1": tracks(), "worm2": None, "single": dish})
     path = written(tmp_path / "d.csv", text)
     trial = reader.read(path)
     np.testing.assert_allclose(trial.points, tracks() * [1, -1])
     assert any("worm2" in note and "single" in note for note in trial.notes)
-    with pytest.raises(Refusal, match="2 points along the body"):
-        reader.read(path, individual="single")
 
 
 @pytest.mark.parametrize(
@@ -310,31 +269,9 @@ def test_one_of_several_animals_is_named(text, tmp_path):
         reader.read(path)
     found = reader.read(path, individual="b")
     np.testing.assert_allclose(found.points, (tracks() + 9) * [1, -1])
-    with pytest.raises(Refusal, match="'c' is unknown"):
-        reader.read(path, individual="c")
-
-
-ONE = deeplabcut({"a": tracks()})
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        (sleap([("", tracks()), ("", tracks() + 9)]), "2 animals without a track"),
-        (ONE.replace("\n0,", "\nlabeled-data/a/i0.png,"), "line 5: .*labelled frames"),
-        (ONE.replace("likelihood", "z"), "three dimensions"),
-    ],
-    ids=["tracks", "frames", "space"],
-)
-def test_tracks_that_are_no_midlines_are_refused(text, said, tmp_path):
-    with pytest.raises(Refusal, match=said):
-        reader.read(written(tmp_path / "d.csv", text))
 
 
 WCON = {"units": {"t": "s", "x": "mm", "y": "mm"}, "data": [{"id": "1", "t": [0.0]}]}
-
-
-SYSF = b"function out = sysf()"
 
 
 @pytest.mark.parametrize(
@@ -353,45 +290,13 @@ SYSF = b"function out = sysf()"
         ("a.json", b'[{"x": 1}]', "it is JSON"),
         ("a.xlsx", b"PK\x03\x04\x14\0", "spreadsheet.*: save the sheet as CSV"),
         ("a.bag", b"#ROSBAG V2.0\n", "a ROS bag"),
-        ("sysf_three_link.m", SYSF, "a program of MATLAB.*drag_ratio"),
+        (
+            "sysf_three_link.m",
+            b"function out = sysf()",
+            "a program of MATLAB.*drag_ratio",
+        ),
     ],
 )
 def test_files_of_other_programs_are_known(name, raw, said, tmp_path):
-    path = written(tmp_path / name, raw)
-    for read in (reader.read, logs.read, drag.read):
-        with pytest.raises(Refusal, match=said):
-            read(path)
-
-
-def gait_of(path):
-    return Shchf(file=str(path))
-
-
-@pytest.mark.parametrize(
-    ("read", "name", "said"),
-    [
-        (scenes.load, "sysf_a.m", "linklengths.*drag_ratio"),
-        (tables.load, "sysf_a.m", "linklengths.*drag_ratio"),
-        (gait_of, "shchf_circle.m", "XV"),
-    ],
-)
-def test_programs_of_sysplotter_are_no_files_of_theirs(read, name, said, tmp_path):
-    program = f"function output = {name[:-2]}(x)"
-    with pytest.raises(Refusal, match=f"program of MATLAB.*{said}"):
-        read(written(tmp_path / name, program))
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("a,b\n1,2\n2,3\n", "points"),
-        ("1,2\n2,3\n", "no header"),
-        (log_text(["0"]), "--fps belongs to midlines"),
-    ],
-)
-def test_an_option_tells_what_a_file_is(text, said, tmp_path, geomech):
-    """A file whose header does not say is what an option is for; one that cannot be
-    read is refused as that."""
-    path = written(tmp_path / "a.csv", text)
-    code, _, err = geomech("fit-gait", path, "--fps", "30")
-    assert code == 2 and said in err
+    with pytest.raises(Refusal, match=said):
+        reader.read(written(tmp_path / name, raw))

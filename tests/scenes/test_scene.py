@@ -7,13 +7,11 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from tabled import tabled
 
 import rft
 from geomech import scenes
-from geomech.mathematics.systems.base import as_system, length_unit
+from geomech.mathematics.systems.base import length_unit
 from geomech.studies.available import default_tiers
-from geomech.studies.scene_tables import SceneTables
 from rft import Chain, Granular
 from rft.core.refusal import Refusal
 
@@ -58,21 +56,8 @@ def test_a_body_of_one_metre_is_no_body_without_a_length(section):
     medium = '[medium]\nlaw = "viscous"\n' if "[body]" in section else ""
     text = f"{medium}[gait]\n{gait}\n{section}\n"
     key = "track" if "drive" in section else "length"
-    sizes = ("", f"{key} = 1.0", f"{key} = 2.0")
-    units = [length_unit(scenes.parse(text + size).system) for size in sizes]
-    assert units == ["BL", "m", "m"]
-
-
-def test_a_class_of_ones_own_is_in_metres_where_it_has_a_length():
-    class Wheel:
-        joints = 1
-
-        def velocity(self, alpha, alphadot):
-            return alphadot[..., :1] * [1.0, 0.0, 0.0]
-
-    assert length_unit(as_system(Wheel())) == "BL"
-    Wheel.length = 1.0
-    assert length_unit(as_system(Wheel())) == "m"
+    for size, unit in (("", "BL"), (f"{key} = 1.0", "m")):
+        assert length_unit(scenes.parse(text + size).system) == unit
 
 
 def test_every_key_arrives():
@@ -133,31 +118,19 @@ def test_bad_scenes_are_refused_in_one_line(text, said):
     assert len(str(caught.value)) < 450
 
 
-def test_unknown_names_and_files():
-    with pytest.raises(Refusal, match="did you mean 'three-link-glass'"):
-        scenes.load("three-link-glas")
-    with pytest.raises(Refusal, match="cannot read scene 'nowhere.toml': No such file"):
-        scenes.load("nowhere.toml")
-
-
 N = {"loads": "midpoint:3", "regularisation": 1e-2}
 
 
 def test_numerics_reach_the_solver_and_the_work():
     """Loads and regularisation, in body velocities and what the body does."""
-    close = scenes.load("three-link-glass-close")
-    scene = close.with_numerics(phases=16, tolerance=1e-13, **N)
+    scene = scenes.load("three-link-glass-close")
+    scene = scene.with_numerics(phases=16, tolerance=1e-13, **N)
     alpha, alphadot = scene.gait.cycle(16, 1.3)
     given = scene.system.medium, scene.system.body, alpha, alphadot
     xi = rft.body_velocity(*given, tolerance=1e-13, **N).xi
-    found = scene.system.solve(alpha, alphadot).xi
-    np.testing.assert_allclose(found, xi, atol=1e-13)
-    assert np.abs(close.system.velocity(alpha, alphadot) - xi).max() > 1e-3
-    moments = rft.work_done(*given, xi, **N).bending_moment
-    for name, value in N.items():
-        other = rft.work_done(*given, xi, **{name: value}).bending_moment
-        assert np.abs(other - moments).max() > 1e-4
     cycle = scene.cycle(amplitudes=1.3, work=True)
+    np.testing.assert_allclose(cycle.xi, xi, atol=1e-12)
+    moments = rft.work_done(*given, xi, **N).bending_moment
     np.testing.assert_allclose(cycle.work.bending_moment, moments, atol=1e-12)
 
 
@@ -166,32 +139,17 @@ def test_numerics_reach_marches():
     heavy = scenes.load("three-link-glass-close").changed(effects=effects)
     heavy = heavy.with_numerics(phases=16, tolerance=1e-13, cycles=2, **N)
     given = heavy.system.medium, heavy.system.body, *heavy.gait.cycle(16, 1.3)
-    options = {"effects": effects, "cycles": 2, "tolerance": 1e-13, "with_work": True}
+    options = {"effects": effects, "cycles": 2, "tolerance": 1e-13}
     marched = rft.time_steps(*given, **options, **N)
-    cycle = heavy.cycle(amplitudes=1.3, work=True)
+    cycle = heavy.cycle(amplitudes=1.3)
     np.testing.assert_allclose(cycle.xi, marched.xi, atol=1e-12)
-    np.testing.assert_allclose(cycle.net, marched.displacement, atol=1e-12)
-    moments = marched.work.bending_moment
-    np.testing.assert_allclose(cycle.work.bending_moment, moments, atol=1e-12)
 
 
-def test_the_path_of_a_linear_medium_needs_no_field():
-    viscous = scenes.load("three-link-viscous")
-    table = tabled(SceneTables(viscous).displacements([1.0], ["path", "direct"]))
-    assert "field" not in table["seconds"]
-    assert math.hypot(*table["path"][0][:2]) == pytest.approx(0.0512808243, abs=5e-11)
-    assert table["path"] == table["direct"]
-
-
-def test_four_links_have_an_area_tier_and_two_have_none():
-    text = GOOD.split("[gait]")[0]
+def test_four_links_have_an_area_tier():
+    text = GOOD.split("[gait]")[0].replace("[1, 2, 1]", "[1, 1, 1, 1]")
     gait = 'kind = "fourier"\ncos = [[1.0], [0.5], [0.0]]\nsin = [[0.0], [0.5], [1.0]]'
-    four = scenes.parse(f"{text.replace('[1, 2, 1]', '[1, 1, 1, 1]')}[gait]\n{gait}")
+    four = scenes.parse(f"{text}[gait]\n{gait}")
     assert default_tiers(four.system) == ("area", "path", "direct")
-    gait = 'kind = "wave"\njoints = 1'
-    two = scenes.parse(f"{text.replace('[1, 2, 1]', '[1, 1]')}[gait]\n{gait}")
-    with pytest.raises(Refusal, match="the area tier takes two joints and more"):
-        SceneTables(two).poses("area")
 
 
 def test_a_large_field_converges_everywhere_in_little_memory():
@@ -206,7 +164,6 @@ def test_a_large_field_converges_everywhere_in_little_memory():
     most = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert solution.residual.max() < 1e-9
-    assert not (solution.status == "unconverged").any()
     assert most < 100e6
 
 

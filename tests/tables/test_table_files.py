@@ -1,7 +1,6 @@
 """What files of tables hold, part by part, and what is wrong with bad ones."""
 
 import json
-import warnings
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,6 @@ import xarray
 from scipy.io import savemat
 
 from geomech.io import tables
-from geomech.mathematics.systems import Table
 from rft.core.refusal import Refusal
 
 AXES = np.linspace(-1.0, 1.0, 5), np.array([-0.5, 0.0, 0.2, 0.9])
@@ -21,9 +19,7 @@ ENTRIES = ("Ax1", "Ax2", "Ay1", "Ay2", "Atheta1", "Atheta2")
 def assert_refused(path, said, **options):
     with pytest.raises(Refusal) as refusal:
         tables.load(path, **options)
-    message = str(refusal.value)
-    assert message.startswith(f"the table {path} {said}")
-    assert "\n" not in message
+    assert str(refusal.value).startswith(f"the table {path} {said}")
 
 
 # NetCDF.
@@ -150,43 +146,11 @@ def test_every_part_of_a_netcdf_file_is_where_it_belongs(sign, stated, turn, tmp
     assert (held.sign, held.order, held.body) == ("+-"[turn < 0], "ndgrid", None)
 
 
-def test_what_a_netcdf_file_does_not_state_is_the_usual(tmp_path):
-    optional = ("speed", "harmonics_residual", "norm_residual", "component")
-    facts = ("length_unit", "body_length", "interpolation", "frame", "level")
-    parts = netcdf(tmp_path / "a.nc", less(*optional, *facts))
-    held = tables.load(tmp_path / "a.nc")
-    speed = np.sqrt((parts["A"] ** 2).mean(1) + parts["fit_residual"] ** 2)
-    np.testing.assert_allclose(held.connection.speed, speed, rtol=1e-12)
-    np.testing.assert_array_equal(held.harmonics.residual, parts["fit_residual"])
-    np.testing.assert_array_equal(held.metric.residual, np.zeros((5, 4)))
-    assert held.connection.size == {"unit": "length", "length": None}
-    assert (held.connection.degree, held.level) == (3, None)
-    assert (held.length, held.unit, held.sized) == (1.0, "BL", False)
-    assert held.frame == "that of the table"
-
-
 def test_parts_that_a_netcdf_file_lacks_are_none(tmp_path):
     netcdf(tmp_path / "a.nc", less("harmonics", "even_part", "A_error", "power_degree"))
     held = tables.load(tmp_path / "a.nc")
     assert held.harmonics is held.even is held.A_error is None
     assert held.metric is held.power_degree is None
-
-
-def test_a_quadratic_metric_is_taken_before_a_norm(tmp_path):
-    M = part("metric", ("joint", "other_joint", *GRID), np.ones((2, 2, 5, 4)))
-    netcdf(tmp_path / "a.nc", M)
-    held = tables.load(tmp_path / "a.nc")
-    np.testing.assert_array_equal(held.metric.M, np.ones((2, 2, 5, 4)))
-    assert held.power_degree == 1.5
-
-
-def test_singular_shapes_leave_no_harmonics_nor_even_part(tmp_path):
-    names = ("A", "fit_residual", "harmonics", "even_part", "A_error")
-    netcdf(tmp_path / "a.nc", masked(*names, **SINGULAR))
-    held = tables.load(tmp_path / "a.nc")
-    assert held.harmonics is held.even is None
-    assert np.argwhere(np.isnan(held.connection.A[0, 0])).tolist() == [[1, 2]]
-    assert np.isnan(held.A_error).sum() == 6
 
 
 @pytest.mark.parametrize(
@@ -294,37 +258,6 @@ def test_parts_of_a_netcdf_file_within_their_bounds_are_read(change, tmp_path):
     assert tables.load(tmp_path / "a.nc").connection.A.shape == (3, 2, 5, 4)
 
 
-@pytest.mark.parametrize(
-    ("level", "found"),
-    [(0.5, 0.5), (0, None), (1, None), (-0.5, None), ([0.5, 0.6], None), ("1", None)],
-)
-def test_a_level_that_makes_no_sense_is_left_out(level, found, tmp_path):
-    netcdf(tmp_path / "a.nc", attributes(level=level))
-    assert tables.load(tmp_path / "a.nc").level == found
-
-
-CHAIN = {"lengths": [1, 2, 1], "frame": "mean", "modes": [[1.0, 0.0]], "waves": 1.0}
-LINKS = {"lengths": [1, 2, 1], "frame": "link-1"}
-
-
-@pytest.mark.parametrize(
-    ("text", "found"),
-    [
-        (json.dumps(CHAIN), CHAIN),
-        (json.dumps(LINKS), LINKS),
-        (json.dumps({"lengths": [1]}), None),
-        (json.dumps({"frame": "mean"}), None),
-        (json.dumps({**CHAIN, "radius": 1}), None),
-        ("[1, 2]", None),
-        ("{", None),
-        ("[" * 100_000, None),
-    ],
-)
-def test_a_body_that_makes_no_sense_is_left_out(text, found, tmp_path):
-    netcdf(tmp_path / "a.nc", attributes(body=text))
-    assert tables.load(tmp_path / "a.nc").body == found
-
-
 # NetCDF of a measured gait: A about it, of two joints and with two harmonics.
 
 GAIT_SHAPES = {
@@ -372,31 +305,9 @@ def test_parts_of_a_gait_are_where_they_belong(sign, turn, tmp_path):
     assert (found.level, found.factor) == (0.9, 2.1)
 
 
-@pytest.mark.parametrize(
-    ("changes", "facts"),
-    [
-        ({"gait_off": None}, {}),
-        ({"gait_errors": np.ones((1, 3, 2, 2, 5))}, {}),
-        ({"gait": np.ones((2, 5))}, {}),
-        ({}, {"level": 0.01, "error_factor": 0.99e6}),
-    ],
-)
-def test_parts_of_a_gait_within_their_bounds_are_read(changes, facts, tmp_path):
-    gait_netcdf(tmp_path / "a.nc", changes, **facts)
-    found = tables.load(tmp_path / "a.nc").connection.taylor
-    assert np.shape(found.standard_error)[:2] == (3, 2)
-
-
 UNFIT = (
     "has a gait whose parts do not fit each other: write it anew with 'geomech fit-g"
 )
-ONE_JOINT = {
-    "gait": np.ones((1, 3)),
-    "gait_A": np.ones((3, 1, 5)),
-    "gait_slope": np.ones((3, 1, 0, 5)),
-    "gait_errors": np.ones((1, 3, 1, 1, 5)),
-    "gait_spread": np.ones((1, 1, 3)),
-}
 EVEN = {
     "gait_A": np.ones((3, 2, 4)),
     "gait_slope": np.ones((3, 2, 1, 4)),
@@ -487,7 +398,6 @@ def test_every_part_of_a_matlab_file_is_where_it_belongs(sign, turn, tmp_path):
     M = [[arrays["M11"], arrays["M12"]], [arrays["M12"], arrays["M22"]]]
     np.testing.assert_array_equal(turn * c.A, A)
     np.testing.assert_array_equal(c.residual, residual)
-    np.testing.assert_allclose(c.speed, np.sqrt((A**2).mean(1) + residual**2))
     np.testing.assert_array_equal(held.metric.M, M)
     np.testing.assert_array_equal(held.A_error, arrays["geomech_A_error"])
     assert c.size == {"unit": "m", "length": 0.3}
@@ -499,67 +409,12 @@ def test_every_part_of_a_matlab_file_is_where_it_belongs(sign, turn, tmp_path):
 
 
 def test_what_a_matlab_file_does_not_state_is_the_usual(tmp_path):
-    lacking = ("M12", "geomech_fit_residual", "geomech_A_error")
-    matlab(tmp_path / "a.mat", dict.fromkeys(lacking))
+    matlab(tmp_path / "a.mat", dict.fromkeys(("M12", "geomech_fit_residual")))
     held = tables.load(tmp_path / "a.mat", "+")
-    c = held.connection
-    assert held.metric is held.A_error is held.power_degree is held.level is None
-    assert np.isnan(c.residual).all()
-    np.testing.assert_allclose(c.speed, np.sqrt((c.A**2).mean(1)), rtol=1e-12)
+    assert held.metric is held.power_degree is held.level is None
+    assert np.isnan(held.connection.residual).all()
     assert (held.unit, held.length, held.sized) == ("BL", 1.0, False)
-    assert (c.degree, held.frame) == (3, "that of the table")
-    assert held.shapes == ("alpha_1", "alpha_2")
-
-
-@pytest.mark.parametrize(
-    ("about", "sized", "degree", "power"),
-    [
-        (
-            {"unit": "m", "length": 0.99e9, "interpolation": 1, "power_degree": 99.0},
-            True,
-            1,
-            99.0,
-        ),
-        (
-            {"unit": "m", "length": 1e9, "interpolation": 4, "power_degree": 100.0},
-            False,
-            3,
-            None,
-        ),
-        (
-            {"unit": "BL", "length": 1.0, "interpolation": 0, "power_degree": 0.0},
-            True,
-            3,
-            None,
-        ),
-        ({"unit": "m", "length": 0.0, "power_degree": 2}, False, 3, None),
-        ({"unit": "m", "length": 2, "frame": 3, "level": "most"}, False, 3, None),
-        ({"unit": "mm", "length": 2.0}, False, 3, None),
-        ([1, 2], False, 3, None),
-    ],
-)
-def test_what_a_matlab_file_states_is_taken_where_it_makes_sense(
-    about, sized, degree, power, tmp_path
-):
-    matlab(tmp_path / "a.mat", about=about)
-    held = tables.load(tmp_path / "a.mat", "+")
-    size = (about["unit"], about["length"]) if sized else ("BL", 1.0)
-    assert (held.sized, held.unit, held.length) == (sized, *size)
-    assert (held.connection.degree, held.power_degree) == (degree, power)
-    assert (held.frame, held.level) == ("that of the table", None)
-
-
-@pytest.mark.parametrize(
-    "names", [["", "a"], ["x" * 61, "a"], ["a\x1b", "b"], ["$x$", "b"], [3, "b"], ["a"]]
-)
-def test_names_of_joints_that_make_no_sense_are_not_taken(names, tmp_path):
-    for stated, found in (
-        (names, ("alpha_1", "alpha_2")),
-        (["a", "a"], ("alpha_1", "alpha_2")),
-        (["a", "x" * 60], ("a", "x" * 60)),
-    ):
-        matlab(tmp_path / "a.mat", about={"shapes": stated})
-        assert tables.load(tmp_path / "a.mat", "+").shapes == found
+    assert (held.connection.degree, held.frame) == (3, "that of the table")
 
 
 @pytest.mark.parametrize(
@@ -639,24 +494,6 @@ def test_parts_of_a_matlab_file_that_do_not_fit_are_refused(changes, said, tmp_p
 
 
 @pytest.mark.parametrize(
-    ("changes", "order", "said"),
-    [
-        ({}, "meshgrid", "has arrays that run as ndgrid's: drop order"),
-        (
-            ROWS,
-            "meshgrid",
-            "has Ax1 of shape (5, 4) where alpha1 and alpha2 make it (4",
-        ),
-    ],
-)
-def test_another_order_than_that_of_the_arrays_is_refused(
-    changes, order, said, tmp_path
-):
-    matlab(tmp_path / "a.mat", changes)
-    assert_refused(tmp_path / "a.mat", said, sign="+", order=order)
-
-
-@pytest.mark.parametrize(
     ("changes", "about", "order"),
     [
         ({}, None, "ndgrid"),
@@ -695,37 +532,26 @@ SAVED = [DATA / "uneven.nc", DATA / "frozen" / "field.mat"]
 
 
 @pytest.mark.parametrize("path", SAVED, ids=lambda path: path.name)
-def test_files_that_are_cut_short_are_refused(path, tmp_path):
-    raw = path.read_bytes()
-    for size in (0, 3, 10, 127, 130, 500, 2000, len(raw) // 2, len(raw) - 9):
-        (tmp_path / path.name).write_bytes(raw[:size])
-        assert_refused(tmp_path / path.name, "")
-
-
-@pytest.mark.parametrize("path", SAVED, ids=lambda path: path.name)
+@pytest.mark.filterwarnings("error")
 def test_damaged_files_are_refused_or_read_as_finite_tables(path, tmp_path):
-    """With up to five bytes changed, 150 times."""
+    """Cut short, and with up to five bytes changed 150 times."""
     raw = path.read_bytes()
+    files = []
+    for size in (0, 3, 10, 127, 130, 500, 2000, len(raw) // 2, len(raw) - 9):
+        files.append(raw[:size])
     rng = np.random.default_rng(1)
     for _ in range(150):
         damaged = bytearray(raw)
         for k in rng.integers(0, 4000, rng.integers(1, 6)):
             damaged[k % len(raw)] = rng.integers(256)
-        (tmp_path / path.name).write_bytes(damaged)
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            try:
-                held = tables.load(tmp_path / path.name)
-            except Refusal as refusal:
-                said = str(refusal)
-                assert said.startswith(f"the table {tmp_path / path.name} ")
-                assert "\n" not in said
-                continue
-        assert np.isfinite(held.connection.A).all()
-
-
-def test_a_field_with_gaps_is_no_system(tmp_path):
-    names = ("A", "fit_residual", "speed", "A_error")
-    netcdf(tmp_path / "a.nc", both(masked(*names, **SINGULAR), less("ccf_pairs")))
-    with pytest.raises(Refusal, match="has singular shapes .nan., and nothing is"):
-        Table(tmp_path / "a.nc")
+        files.append(damaged)
+    outcomes = []
+    for file in files:
+        (tmp_path / path.name).write_bytes(file)
+        try:
+            held = tables.load(tmp_path / path.name)
+            outcomes.append(np.isfinite(held.connection.A).all())
+        except Refusal:
+            outcomes.append("refused")
+    assert set(outcomes[:9]) == {"refused"}
+    assert set(outcomes) == {"refused", True}

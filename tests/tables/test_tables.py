@@ -7,14 +7,12 @@ import pickle
 
 import numpy as np
 import pytest
-from commands import geomech
 from scipy.io import loadmat, savemat
 from tabled import tabled
 
 import rft
-from geomech import api, scenes
+from geomech import api
 from geomech.io import tables
-from geomech.io.tables import base
 from geomech.mathematics.gaits import Butterfly, Circle, Ellipse, Fourier
 from geomech.mathematics.geometry.connection import Connection
 from geomech.mathematics.systems import NoSlipSnake, Swimmer, Table
@@ -22,14 +20,10 @@ from geomech.mathematics.systems.base import length_unit
 from geomech.mathematics.systems.capabilities import table_error
 from geomech.mathematics.systems.table import LENGTHS
 from geomech.scenes import Numerics, Scene
-from geomech.shell.describe.scene import description
-from geomech.shell.describe.system import system_lines
 from geomech.studies.estimates import estimate
 from geomech.studies.maps import fields
-from geomech.studies.mechanics.single import diagnosed_velocity
 from geomech.studies.scene_tables import SceneTables
 from rft.bodies.base import body_size
-from rft.core.refusal import Refusal
 from rft.laws import CATALOGUE
 
 pytestmark = pytest.mark.usefixtures("fastest")
@@ -71,38 +65,16 @@ def plain_mat(path, c, sign=1.0, order="ndgrid", **more):
     savemat(path, {**arrays, **more})
 
 
-def table_scene(path):
-    """Write a scene of a.mat or a.nc beside it."""
-    text = '[system]\nkind = "table"\nfile = "{}"\n[gait]\nkind = "circle"\n'
-    path.with_suffix(".toml").write_text(text.format(path.name) + "amplitude = 0.3\n")
-    return path.with_suffix(".toml")
-
-
-def assert_same(a, b):
-    assert (a.degree, a.size) == (b.degree, b.size)
-    np.testing.assert_array_equal(a.axes, b.axes)
-    for name in ("A", "residual", "speed"):
-        np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
-
-
 def test_netcdf_gives_back_every_digit(made):
     folder, source = made
     held = tables.load(folder / "a.nc")
+    for name in ("axes", "A", "residual", "speed"):
+        expected = getattr(source.fitted, name)
+        np.testing.assert_array_equal(getattr(held.connection, name), expected)
     harmonics = source.table("harmonic")
-    assert_same(Connection.load(folder / "a.nc"), source.fitted)
     np.testing.assert_array_equal(held.harmonics.coefficients, harmonics.coefficients)
-    np.testing.assert_array_equal(held.harmonics.residual, harmonics.residual)
     assert (held.length, held.unit, held.frame) == (0.3, "m", "link-1")
     assert (held.sign, held.assumptions) == ("+", ())
-
-
-@pytest.mark.parametrize(("off", "mirror"), [(1e-11, True), (1e-7, False)])
-def test_left_and_right_are_alike_to_rounding(off, mirror, made):
-    held = tables.load(made[0] / "a.nc")
-    A = held.connection.A.copy()
-    A[..., 0, 3] += off * np.abs(A).max()
-    moved = dataclasses.replace(held.connection, A=A)
-    assert dataclasses.replace(held, connection=moved).mirror == mirror
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
@@ -111,7 +83,6 @@ def test_singular_shapes_go_through_files_as_nan(ending, tmp_path):
     fields.save_connection(tmp_path / f"a{ending}", snake)
     again = Connection.load(tmp_path / f"a{ending}")
     np.testing.assert_array_equal(again.A, snake.fitted.A)
-    np.testing.assert_array_equal(again.residual, snake.fitted.residual)
 
 
 @pytest.mark.parametrize("sign", "+-")
@@ -119,16 +90,15 @@ def test_singular_shapes_go_through_files_as_nan(ending, tmp_path):
 def test_a_mat_round_trip_keeps_every_digit(sign, order, made, tmp_path):
     source = made[1]
     fields.save_connection(tmp_path / "a.mat", source, sign=sign, order=order)
-    found = loadmat(tmp_path / "a.mat")
     plain_mat(tmp_path / "plain.mat", source.fitted, float(f"{sign}1"), order)
-    plain = loadmat(tmp_path / "plain.mat")
-    again = on(tmp_path / "a.mat")
-    for name in ("alpha1", "alpha2", "Ax1", "Ax2", "Ay1", "Ay2", "Atheta1", "Atheta2"):
-        np.testing.assert_array_equal(found[name], plain[name])
-    np.testing.assert_array_equal(again.fitted.A, source.fitted.A)
-    np.testing.assert_array_equal(again.fitted.residual, source.fitted.residual)
-    assert (length_unit(again.scene.system), again.scene.frame) == ("m", "link-1")
-    assert body_size(again.scene.system) == 0.3
+    found = loadmat(tmp_path / "a.mat")
+    for name, values in loadmat(tmp_path / "plain.mat").items():
+        if not name.startswith("__"):
+            np.testing.assert_array_equal(found[name], values)
+    held = tables.load(tmp_path / "a.mat")
+    np.testing.assert_array_equal(held.connection.A, source.fitted.A)
+    np.testing.assert_array_equal(held.connection.residual, source.fitted.residual)
+    assert (held.length, held.unit, held.frame) == (0.3, "m", "link-1")
 
 
 # Intervals of A, half as wide as these.
@@ -162,12 +132,11 @@ def test_intervals_of_a_table_are_part_of_its_error(with_intervals, made):
     cycle = GAIT.cycle(64, 0.7)
     path_length = 2 * np.pi * np.linalg.norm(cycle[1], axis=-1).mean()
     least = np.sqrt(2) * 0.01 * path_length
-    for length in (1.0, 2.0):
-        table = Table(with_intervals, body_length=length)
-        plain = Table(with_intervals.with_name("plain.mat"), body_length=length)
-        more = table_error(table, *cycle) - table_error(plain, *cycle)
-        assert least < more[1] < 2 * least
-        assert least < length * more[0] < 3 * least
+    table = Table(with_intervals, body_length=2.0)
+    plain = Table(with_intervals.with_name("plain.mat"), body_length=2.0)
+    more = table_error(table, *cycle) - table_error(plain, *cycle)
+    assert least < more[1] < 2 * least
+    assert least < 2.0 * more[0] < 3 * least
 
 
 # Signs.
@@ -183,33 +152,6 @@ def test_the_sign_of_a_bare_mat_file_is_made_out(frame, medium, tmp_path):
         assert (held.sign, held.order) == (sign, order)
         assert "its sign is made out as xi = " + sign in held.assumptions[-1]
         np.testing.assert_array_equal(held.connection.A, c.A)
-        assert not held.has_residual
-        told = tables.load(tmp_path / "a.mat", sign="+")
-        np.testing.assert_array_equal(told.connection.A, factor * c.A)
-        assert "sign" not in "".join(told.assumptions)
-
-
-@pytest.mark.parametrize(
-    ("zero", "sign", "opposite"),
-    [(0.55, "+", "-"), (0.49, "", ""), (0.31, "", ""), (0.29, "-", "+")],
-)
-def test_the_sign_is_that_of_loops_of_three_and_five_tenths_of_the_grid(
-    zero, sign, opposite
-):
-    """Of a field by which a loop about the grid's middle moves by
-    - r^2 (1 - r^2 / zero^2); none where their signs differ."""
-    axes = np.linspace(-1, 3, 9), np.linspace(0, 2, 7)
-    a, b = np.meshgrid(axes[0] - 1.0, axes[1] - 1.0, indexing="ij")
-    A = np.zeros((3, 2, 9, 7))
-    A[0] = (1 - (a**2 + b**2) / zero**2) * np.array([b, -a])
-    nothing = np.zeros((3, 9, 7))
-    for turn, expected in ((1.0, sign), (-1.0, opposite)):
-        c = Connection(axes, turn * A, nothing, 1 + nothing, 3)
-        if expected:
-            assert base.detected_sign(c) == expected
-            continue
-        with pytest.raises(Refusal, match="does not tell the sign of A: say sign"):
-            base.detected_sign(c)
 
 
 # Predictions.
@@ -227,41 +169,42 @@ GAITS = (
 )
 
 
+SCALY = (rft.SkinFriction(0.05, 0.25),)  # tells forwards from backwards
+
+
 @pytest.mark.parametrize(
-    ("body", "medium", "ending"),
+    ("body", "medium", "effects", "ending"),
     [
-        ("even", GLASS, ".nc"),
-        ("uneven", GLASS, ".nc"),
-        ("short head", CLOSE, ".nc"),
-        ("uneven", rft.Viscous(2.0), ".nc"),
-        ("uneven", CLOSE, ".mat"),
-        ("even", rft.Viscous(3.0), ".mat"),
+        ("even", GLASS, (), ".nc"),
+        ("uneven", GLASS, (), ".nc"),
+        ("short head", CLOSE, (), ".nc"),
+        ("uneven", rft.Viscous(2.0), (), ".nc"),
+        ("uneven", CLOSE, (), ".mat"),
+        ("even", rft.Viscous(3.0), (), ".mat"),
+        ("uneven", GLASS, SCALY, ".nc"),
+        ("uneven", GLASS, SCALY, ".mat"),
     ],
 )
 def test_a_table_predicts_what_its_scene_predicts_within_its_error(
-    body, medium, ending, tmp_path
+    body, medium, effects, ending, tmp_path
 ):
-    source = study(medium, BODIES[body], grid=21, extent=2.3, harmonics=9)
+    source = study(medium, BODIES[body], effects, grid=21, extent=2.3, harmonics=9)
     fields.save_connection(tmp_path / f"a{ending}", source)
     table = on(tmp_path / f"a{ending}")
     amplitudes = [0.3, 0.8, 1.2]
-    ratios = []
     for gait in GAITS:
         true = source.poses("direct", gait, amplitudes)
         tiers = ["area", "path", "harmonic", "direct"]
         told = tabled(table.displacements(amplitudes, tiers, gait))
         for tier in tiers:
             off = np.abs(told[tier] - true)
-            distance = np.hypot(*off.T[:2])
-            assert (distance <= np.array(told["estimate"][tier]) + 1e-12).all()
+            errors = np.array(told["estimate"][tier])
             headings = np.array(told["estimate_heading"][tier])
+            assert (np.hypot(off[:, 0], off[:, 1]) <= errors + 1e-12).all()
             assert (off[:, 2] <= headings + 1e-12).all()
-        ratios.append(told["estimate"]["direct"] / distance)
-        for tier in ("area", "path"):  # of the same connection
-            same = source.with_numerics(interpolation=3).poses(tier, gait, amplitudes)
-            np.testing.assert_allclose(told[tier], same, atol=2e-5)
-    assert np.median(ratios) < 60  # honest, not helpless
-    if ending == ".nc" and medium.dry:  # by its harmonics: of A alone it is 0.1 or more
+    if (
+        ending == ".nc" and medium.dry and not effects
+    ):  # by its harmonics: of A alone it is 0.1 or more
         size = body_size(source.scene.system)
         assert max(told["estimate"]["direct"]) < 0.02 * size
 
@@ -269,17 +212,19 @@ def test_a_table_predicts_what_its_scene_predicts_within_its_error(
 def random_scene(rng):
     """A three-link swimmer in any medium, half of those in sand with skin friction, and
     a gait that reaches the field's edge."""
-    k = rng.integers(4)
     granular = rft.Granular(10 ** rng.uniform(-1, 1), rng.uniform(0.1, 1.2))
-    sands = (granular, GLASS, rft.Coulomb())
-    medium = sands[k] if k < 3 else rft.Viscous(10 ** rng.uniform(0.1, 1.5))
+    fluid = rft.Viscous(10 ** rng.uniform(0.1, 1.5))
+    medium = (granular, GLASS, rft.Coulomb(), fluid)[rng.integers(4)]
     skin = rft.SkinFriction(*rng.uniform(0.05, 0.3, 2))
-    frames = ("mean", "link-1", "link-2", "link-3")
-    lengths = tuple(rng.uniform(0.5, 2, 3))
-    body = rft.Chain(lengths, rng.uniform(0.1, 3), frames[rng.integers(4)])
+    effects = (skin,) if medium.dry and rng.integers(2) else ()
+    frame = ("mean", "link-1", "link-2", "link-3")[rng.integers(4)]
+    body = rft.Chain(tuple(rng.uniform(0.5, 2, 3)), rng.uniform(0.1, 3), frame)
     extent = rng.uniform(1.2, 2.6)
-    grid = int(rng.integers(9, 33))
-    harmonics = int(2 * rng.integers(0, 8) + 1)
+    numerics = Numerics(
+        grid=int(rng.integers(9, 33)),
+        extent=extent,
+        harmonics=int(2 * rng.integers(0, 8) + 1),
+    )
     where = {
         "centre": tuple(0.3 * extent * rng.uniform(-1, 1, 2)),
         "reverse": bool(rng.integers(2)),
@@ -294,12 +239,8 @@ def random_scene(rng):
     gait = gaits[rng.integers(4)]
     size = np.abs(gait.unit(np.linspace(0, 2 * np.pi, 500))).max()
     largest = 0.98 * (extent - np.abs(gait.centre).max()) / size
-    effects = (skin,) if k < 3 and rng.integers(2) else ()
-    return Scene(
-        Swimmer(medium, body, effects),
-        dataclasses.replace(gait, amplitude=largest),
-        Numerics(grid=grid, extent=extent, harmonics=harmonics),
-    )
+    gait = dataclasses.replace(gait, amplitude=largest)
+    return Scene(Swimmer(medium, body, effects), gait, numerics)
 
 
 @pytest.mark.soak
@@ -317,99 +258,38 @@ def test_errors_of_tables_of_random_scenes_cover(ending, tmp_path):
         off = estimate.pose_distance(poses, true, body_size(source.scene.system))
         ratios.append(errors / np.maximum(off, 1e-12))
     covered = (np.array(ratios) >= 1).mean((0, 1))
-    median = np.median(np.array(ratios)[..., 0])
-    print(f"{ending}: covered {covered}, median {median:.3g} errors")
     assert (covered >= 0.98).all()
-    assert median < 25
+    assert np.median(np.array(ratios)[..., 0]) < 25
 
 
 SCALY = (rft.SkinFriction(0.05, 0.25),)  # tells forwards from backwards
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
-def test_what_is_even_in_alphadot_is_part_of_the_error(ending, tmp_path):
-    source = study(effects=SCALY, grid=15, harmonics=9)
-    fields.save_connection(tmp_path / f"a{ending}", source)
-    table = Scene(Table(tmp_path / f"a{ending}"), GAIT)
-    assert ("xi is not odd in alphadot" in description(table)) == (ending == ".nc")
-    for gait in (GAIT, Circle(amplitude=1.2), Butterfly(amplitude=0.8)):
-        amplitudes = gait.amplitude * np.array([0.3, 0.8, 1.1])
-        poses, errors = estimate.direct(table, gait, amplitudes, 128)
-        true = source.poses("direct", gait, amplitudes)
-        assert (estimate.pose_distance(poses, true, 0.3) <= errors).all()
-
-
-def test_a_bare_mat_file_goes_through_netcdf_without_a_residual(made, tmp_path):
-    plain_mat(tmp_path / "bare.mat", made[1].fitted)
-    bare = on(tmp_path / "bare.mat")
-    assert diagnosed_velocity(bare.scene.system, [0.2, 0.3], [1, 0])["residual"] is None
-    for ending in ENDINGS:
-        fields.save_connection(tmp_path / f"a{ending}", bare)
-        held = tables.load(tmp_path / f"a{ending}")
-        np.testing.assert_array_equal(held.connection.A, made[1].fitted.A)
-        assert not held.has_residual
-        assert "fit residual unknown" in repr(held.connection)
-
-
 # Tables as systems.
 
 
-def test_a_table_is_saved_and_pickled_as_the_name_of_its_file(made):
+def test_a_table_is_pickled_as_the_name_of_its_file(made):
     table = Table(made[0] / "a.nc")
-    written = scenes.toml(Scene(table, Circle()))
-    assert scenes.parse(written).system == table
     pickled = pickle.dumps(table)
     assert pickle.loads(pickled) == table
     assert len(pickled) < 1000
 
 
-def unsized(made, path):
-    """The table of `made` in a file that does not state lengths."""
-    if path.suffix == ".mat":
-        plain_mat(path, made[1].fitted)
-        return
-    raw = (made[0] / "a.nc").read_bytes()
-    assert raw.count(b"length_unit") == raw.count(b"body_length") == 1
-    raw = raw.replace(b"length_unit", b"length_UNIT")
-    path.write_bytes(raw.replace(b"body_length", b"body_LENGTH"))
-
-
-@pytest.mark.parametrize("ending", ENDINGS)
-def test_lengths_that_a_file_does_not_state_are_assumed_in_a_note(
-    ending, made, tmp_path
+@pytest.mark.parametrize("length", [1.0, 3.0])
+def test_lengths_that_a_file_does_not_state_are_assumed_or_given(
+    length, made, tmp_path
 ):
-    path = tmp_path / f"a{ending}"
-    unsized(made, path)
+    path = tmp_path / "a.mat"
+    plain_mat(path, made[1].fitted)
     bare = Table(path)
     assert bare.assumed[-1] == LENGTHS
-    assert LENGTHS in system_lines(bare)
     assert (length_unit(bare), bare.length) == ("BL", 1.0)
-    assert bare.stored.connection.size == {"unit": "BL", "length": 1.0}
-    assert Connection.load(path).size == {"unit": "length", "length": None}
-    err = geomech("explain", table_scene(path))[2]
-    assert err.count(LENGTHS) == 1
-
-
-@pytest.mark.parametrize("length", [1.0, 3.0])
-@pytest.mark.parametrize("ending", ENDINGS)
-def test_the_length_of_a_scene_makes_body_lengths_of_a_table(
-    length, ending, made, tmp_path
-):
-    path = tmp_path / f"a{ending}"
-    unsized(made, path)
     told = Table(path, body_length=length)
     assert LENGTHS not in told.assumed
     assert length_unit(told) == "BL"
-    xi = Table(path).velocity([0.2, 0.4], [1.0, -0.5])
     scaled = told.velocity([0.2, 0.4], [1.0, -0.5]) * [length, length, 1]
+    xi = bare.velocity([0.2, 0.4], [1.0, -0.5])
     np.testing.assert_allclose(scaled, xi, rtol=1e-13)
-
-
-@pytest.mark.parametrize("ending", ENDINGS)
-def test_nothing_is_assumed_of_a_file_that_states_all(ending, made):
-    table = Table(made[0] / f"a{ending}")
-    assert table.assumed == ()
-    assert table.stored.connection.size == {"unit": "m", "length": 0.3}
 
 
 def test_what_accuracy_costs_includes_the_tables_own_error(made):
@@ -418,10 +298,7 @@ def test_what_accuracy_costs_includes_the_tables_own_error(made):
     own = table_error(scene.system, *GAIT.cycle(64, found["amplitude"].values))
     largest = own[:, 0].max()
     assert float(found["own_error"]) == largest
-    assert 1e-4 < largest < 0.1
-    tolerance = found["tolerance"].values
+    met = found["tolerance"].values > largest
     best = found["best_error"].values
-    met = tolerance > largest
     np.testing.assert_array_equal(np.isfinite(best), met)
     assert (best[met] > largest).all()
-    assert (best[met] <= tolerance[met]).all()

@@ -15,7 +15,7 @@ import numpy as np
 from geomech.io.tables.matlab import DEEPEST, LARGEST
 from rft.core.refusal import Refusal
 
-MOST_NODES = 20_000  # some seconds of reading; files of sysplotter have some hundreds
+MOST_NODES = 5_000  # some seconds of reading; files of sysplotter have some hundreds
 CURE = "pip install 'geomech[hdf5]', or save it in MATLAB by save(FILE, ..., '-v7')"
 ANEW = "save it in MATLAB again, by save(FILE, ..., '-v7')"
 
@@ -51,12 +51,14 @@ class Reader:
     """Reader of the nodes of one file, within limits.
 
     bytes_left: that may still be read, inflated. nodes_left: groups, arrays and
-    references that may still be read; a file can name each of them many times."""
+    references that may still be met. values_read: of the nodes met so far, as a few
+    cells of cells can name one node a million times."""
 
     def __init__(self, file: Any):
         self.file = file
         self.bytes_left = LARGEST
         self.nodes_left = MOST_NODES
+        self.values_read: dict[Any, Any] = {}
 
     def member(self, group: Any, name: str, depth: int) -> Any:
         """Return the value of a node in a group; Refusal, with its place, if it cannot
@@ -76,12 +78,22 @@ class Reader:
     def value(self, node: Any, place: str, depth: int) -> Any:
         """Return an array, a text, a cell or a struct; None for anything else.
         depth: of cells and structs that may still lie within."""
-        import h5py
-
         self.nodes_left -= 1
-        if self.nodes_left < 0:
+        self._require_nodes(0)
+        if node not in self.values_read:
+            self.values_read[node] = self._value(node, place, depth)
+        return self.values_read[node]
+
+    def _require_nodes(self, count: int) -> None:
+        """Refusal unless ``count`` nodes may still be met."""
+        if self.nodes_left < count:
             reason = f"it has more than {MOST_NODES:,} cells and fields"
             raise Refusal("is too large, or damaged", because=reason, instead=ANEW)
+
+    def _value(self, node: Any, place: str, depth: int) -> Any:
+        """Return the value of a node that is met for the first time."""
+        import h5py
+
         if not depth:
             raise Refusal(
                 f"is damaged at {place}", because="it lies in itself", instead=ANEW
@@ -111,6 +123,7 @@ class Reader:
         return np.asarray(node[()]).T
 
     def _cell(self, references: np.ndarray, place: str, depth: int) -> np.ndarray:
+        self._require_nodes(references.size)
         values = np.empty(references.shape, object)
         for index in np.ndindex(references.shape):
             label = ", ".join(str(k + 1) for k in index)
