@@ -11,7 +11,7 @@ from artists import drawn
 from scipy.spatial.transform import Rotation
 
 from figures.robots import walking_sensitivity, walking_steps
-from figures.terradynamics import wheel
+from figures.terradynamics import meshes, wheel
 from geomech import scenes
 from geomech.questions.terradynamics.walk import Walk
 from geomech.studies.terradynamics import walking
@@ -479,6 +479,7 @@ FIGURES = [
     ),
     (walking_sensitivity, {"factors": (1.0, 1.1), "names": ("robot.height",)}),
     (wheel, {"slips": 3}),
+    (meshes, {"ladder": (80, 160, 320)}),
 ]
 
 
