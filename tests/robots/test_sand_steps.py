@@ -122,6 +122,20 @@ def test_what_came_to_rest_stays_where_it_does_at_short_steps(name, options, ste
 
 @needs_numba
 @STEPS
+def test_a_block_that_was_pressed_does_not_rise(step):
+    """By 60 N, for half a second; -17.34 mm at 0.1 ms."""
+    model = model_of(free(0.016, BLOCK), step)
+    data = mujoco.MjData(model)
+    with rft.mujoco.attach(model, LOOSE):
+        data.xfrc_applied[1, 2] = -60.0
+        pressed = after(model, data, 0.5)[2]
+        data.xfrc_applied[1, 2] = 0.0
+        assert 1e3 * pressed == pytest.approx(-17.34, abs=0.1)
+        assert after(model, data, 1.0)[2] == pytest.approx(pressed, abs=1e-5)
+
+
+@needs_numba
+@STEPS
 @pytest.mark.parametrize("angle", [0.1, 0.3, 0.5])
 def test_a_box_on_a_slope_below_repose_comes_to_rest(step, angle):
     lean = f'euler="0 {-np.degrees(angle)} 0"'
