@@ -185,7 +185,6 @@ def test_plates_in_grains_stand_beside_bars_and_the_map():
     stress = face_stress(StressMap(tension="keep"), plates_figure.BETA)
     lift = plates_figure.lift_over_drag(deep, plates_figure.BETA, *stress)
     assert lift == pytest.approx(0.81, abs=0.01)
-    assert bar["normal"][bar["beta"] > np.radians(143)].min() > 0.009  # N/cm^3
     assert maps["cut"]["misfit"][1] < 0.75 * maps["keep"]["misfit"][1]
 
 

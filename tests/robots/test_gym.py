@@ -80,16 +80,6 @@ def test_many_robots_go_as_each_alone():
     many.close()
 
 
-@pytest.mark.parametrize(
-    "call", [lambda env: env.reset(), lambda env: env.step([0] * 6)]
-)
-def test_a_closed_environment_says_so(call):
-    env = geomech.gym.HexapodSand()
-    env.close()
-    with pytest.raises(ValueError, match="the environment is closed: make it anew"):
-        call(env)
-
-
 @pytest.mark.parametrize("count", [1, pytest.param(3, marks=needs_batch)])
 def test_what_is_no_number_truncates_an_episode(count):
     """Of many robots only that one's."""

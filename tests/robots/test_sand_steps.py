@@ -307,18 +307,6 @@ def test_numpy_and_compiled_code_take_the_same_steps(name, options):
     np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=1e-4 * size)
 
 
-@needs_numba
-def test_robots_of_one_model_are_solved_block_by_block():
-    """Each as it goes alone; a robot beside that is not in the sand changes nothing."""
-    alone = model_of(free(0.03, BOX, 'euler="20 10 0"'), 0.002)
-    (end,), _, _ = in_loose(alone, (0.2,))
-    many = "".join(free(0.03, BOX, 'euler="20 10 0"', x=k) for k in range(3))
-    model = model_of(many + free(9.0, BOX, x=9), 0.002)
-    (ends,), _, _ = in_loose(model, (0.2,))
-    for k in range(3):
-        np.testing.assert_allclose(ends[7 * k + 1 : 7 * k + 7], end[1:], atol=1e-7)
-
-
 @pytest.mark.parametrize(
     "law",
     [

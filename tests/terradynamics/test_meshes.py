@@ -23,7 +23,6 @@ from rft.terradynamics.meshes import (
     Rotate,
     Screw,
     Sphere,
-    bearing,
     read,
     wrench,
 )
@@ -233,18 +232,3 @@ def test_without_trimesh_files_are_refused(tmp_path, monkeypatch):
     write_stl(tmp_path / "a.stl", BALL)
     with pytest.raises(ValueError, match=r"needs trimesh: pip install 'geomech\[mesh"):
         MeshFile(str(tmp_path / "a.stl"))
-
-
-def test_pictures_show_the_stress_on_the_mesh():
-    """Below the surface, and the faces above it."""
-    scene = scenes.parse(MADE.replace("distance = 0.05", "distance = 0.001"))
-    found = scene.run()
-    step = np.linalg.norm(found.force, axis=-1).argmax()
-    faces, above = scene.faces(found, step)
-    _, place, turn, *rates, _ = (x[step] for x in found.trajectory)
-    expected = bearing(scene.medium, scene.mesh, turn, place, *rates, scene.effects)
-    np.testing.assert_array_equal(faces.force, expected.force)
-    sides = [np.diff(t, axis=1).swapaxes(0, 1) for t in (faces.corners, above)]
-    areas = [np.linalg.norm(np.cross(*side), axis=-1).sum() / 2 for side in sides]
-    assert min(areas) > 0
-    assert sum(areas) == pytest.approx(scene.mesh.areas.sum())

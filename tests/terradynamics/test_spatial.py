@@ -10,7 +10,6 @@ from rft.terradynamics.meshes.forces import law
 from rft.terradynamics.meshes.surfaces import shapes
 from rft.terradynamics.meshes.surfaces.mesh import quartered_mesh
 from rft.terradynamics.meshes.surfaces.smooth import smooth
-from rft.terradynamics.plates import VERTICAL
 
 pytestmark = pytest.mark.usefixtures("fastest")
 
@@ -109,35 +108,6 @@ def test_faces_that_are_pulled_keep_push_or_lose_the_stress():
     assert pulled.mean() == pytest.approx(0.0487, abs=0.005)
     assert across["push"] == pytest.approx(-np.abs(kept))
     assert across["cut"] == pytest.approx(np.where(pulled, 0.0, kept))
-
-
-@pytest.mark.parametrize(
-    ("stress", "most", "share"),
-    [
-        (law.alpha, 8e-4, 1.1e-4),
-        (Spatial(1.0, 0.4, "keep").stress, 8e-4, 1.1e-4),
-        (Spatial(1.0, 0.4).stress, 4e-4, 1e-5),
-        (Spatial(1.0, 0.2).stress, 4e-4, 0.0),
-    ],
-    ids=["as fitted", "keep", "cut", "less friction"],
-)
-def test_where_the_law_drives_it_says_so(stress, most, share):
-    """Nowhere but in the two regions that the docstring tells of."""
-    n = directions(400_000)
-    v = directions(400_000)
-    n *= np.where((n * v).sum(-1) < 0, -1, 1)[:, None]
-    power = (stress(n, v) * v).sum(-1)
-    tilt = np.degrees(np.arccos(n[:, 2]))
-    up = np.degrees(np.arcsin(v[:, 2]))
-    drives = power > 1e-12
-    level = drives & (tilt < 10)
-    assert level.mean() < 6e-4
-    assert power[level].max() < 0.0053
-    tilted = drives & ~level
-    assert tilted.mean() == pytest.approx(share, abs=5e-5)
-    assert power[tilted].max(initial=0.0) < most
-    region = (tilt > 56) & (tilt < 64.5) & (up > 63.5) & (up < 72)
-    assert region[tilted].all()
 
 
 def test_strength_from_density_and_friction():
@@ -308,15 +278,3 @@ def test_smooth_cylinders_keep_their_edges():
     sheet = smooth(Mesh(mesh.vertices, mesh.faces[side], closed=False)).two_sided
     front, back = np.split(sheet.middle_normals, 2)
     np.testing.assert_allclose(back, -front, atol=1e-15)
-
-
-@pytest.mark.parametrize("name", ["generic", "poppy-seeds-loose", "poppy-seeds-close"])
-def test_the_trend_is_that_of_the_map_of_two_dimensions(name):
-    """Both over their stress on a plate pushed straight down."""
-    line = np.radians(np.arange(-88, 89, 4))
-    beta, gamma = np.meshgrid(line, line, indexing="ij")
-    stress = VERTICAL[name].stress
-    flat = np.stack(stress(beta, gamma)) / stress(0.0, np.pi / 2)[1]
-    solid = law.alpha_of_angles(beta, gamma, 0.0) / Spatial(1.0).plate
-    assert np.corrcoef(flat[0].ravel(), -solid[..., 0].ravel())[0, 1] > 0.79
-    assert np.corrcoef(flat[1].ravel(), solid[..., 2].ravel())[0, 1] > 0.9

@@ -276,12 +276,6 @@ def test_what_makes_no_walk_is_refused(build, said):
         build()
 
 
-def test_an_eccentric_wheel_is_a_leg():
-    rod = dataclasses.replace(LIGHT_ROD, axle=0.015)
-    moved = rod.legs.outline(20).points - [0, 0.015]
-    np.testing.assert_allclose(rod.leg(20).points, moved)
-
-
 PLANAR = [n for n in scenes.walker_names() if scenes.load(n).engine == "planar"]
 
 
@@ -370,18 +364,6 @@ def test_robots_side_by_side_walk_as_alone():
         assert one.speed == pytest.approx(alone.speed, abs=1e-9)
 
 
-def test_a_brief_walk_foretells_when_it_settles():
-    """Of a robot that drags its belly and swings through the limit's speed."""
-    brief, long = (
-        walk([xplorer(-0.6, 3.25)], dataclasses.replace(COARSE, duration=duration))[0]
-        for duration in (2.0, 6.0)
-    )
-    x = np.interp(np.arange(20) / 3.25, long.t, long.pose[:, 0])
-    settled = cycles_to_settle(np.diff(x), long.speed / 3.25) / 3.25
-    assert 4.0 < settled == long.settling_time < 6.0
-    assert abs(brief.settling_time - settled) < 1.5 / 3.25
-
-
 def test_a_walk_goes_on_as_its_last_cycle_until_its_duration():
     (one,) = walk([xplorer(0.3, 3.0)], dataclasses.replace(COARSE, duration=6.1))
     assert 6.1 - 1 / 30 < one.t[-1] <= 6.1
@@ -451,18 +433,6 @@ def test_a_walk_may_be_over_before_its_first_step():
     assert walking.cost_of_transport(XPLORER, found) == math.inf
 
 
-def test_the_accuracy_of_a_walk_is_that_of_its_speed():
-    scene = dataclasses.replace(XPLORER, numerics=COARSE)
-    question = walking.Settings(scene).with_shared_data()
-    steps = question.settings()[0]
-    truth = question.evaluate(steps, 32)
-    error = question.errors(question.evaluate(steps, 12), truth)["error"]
-    assert 1e-4 < error < 0.05
-    again = dataclasses.replace(scene, numerics=dataclasses.replace(COARSE, steps=32))
-    (one,) = walking.walked([again], settling=True)
-    assert one.walk.speed == pytest.approx(float(truth[0]), rel=1e-3)
-
-
 @pytest.mark.parametrize("name", scenes.walker_names())
 def test_a_walker_written_is_the_walker_read(name):
     scene = scenes.load(name)
@@ -479,7 +449,7 @@ FIGURES = [
     ),
     (walking_sensitivity, {"factors": (1.0, 1.1), "names": ("robot.height",)}),
     (wheel, {"slips": 3}),
-    (meshes, {"ladder": (80, 160, 320)}),
+    (meshes, {"ladder": (80, 320, 1280)}),
 ]
 
 
