@@ -1,4 +1,4 @@
-"""Robots of MJCF files, and the engine of three dimensions from the command line."""
+"""Robots of MJCF files in the engine of three dimensions."""
 
 import dataclasses
 import os

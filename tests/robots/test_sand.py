@@ -202,7 +202,7 @@ def test_forces_are_those_of_the_meshes_and_do_their_virtual_work(name, law, sol
 
 
 @pytest.mark.parametrize("geom", GEOMS)
-def test_a_geom_that_hardly_dips_in_bears(geom, solved_by):
+def test_a_geom_that_hardly_dips_in_bears(geom):
     """With its lowest corner 0.5 mm deep, whatever its pose."""
     model = model_of(free(f'<geom {geom} pos="0.02 0.01 -0.03"/>'))
     data = mujoco.MjData(model)

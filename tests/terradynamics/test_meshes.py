@@ -1,4 +1,4 @@
-"""Solid bodies: their meshes and motions, files of meshes, pictures."""
+"""Solid bodies: their meshes and motions, and files of meshes."""
 
 import dataclasses
 import math

@@ -1,5 +1,5 @@
-"""Screws in the ground: meshes, forces against integrals over surfaces, limits, and
-craft that two of them drive."""
+"""Screws in the ground: their meshes and forces, and the craft that two of them
+drive."""
 
 import dataclasses
 

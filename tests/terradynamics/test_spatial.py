@@ -1,4 +1,4 @@
-"""Three-dimensional resistive force theory on meshes, against limits of the law, closed
+"""Three-dimensional resistive force theory on meshes, against the published law, closed
 forms and finer meshes."""
 
 import numpy as np

@@ -1,5 +1,5 @@
-"""The vertical plane: the stress map against its definition and its check values, loads
-against closed forms, adaptive quadrature, mirror images and far finer computations."""
+"""The vertical plane: the stress map against its definition, loads against adaptive
+quadrature, mirror images and far finer computations."""
 
 import dataclasses
 import itertools
