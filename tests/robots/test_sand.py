@@ -482,6 +482,26 @@ def test_a_foot_meets_less_sand_in_its_print(options):
     assert first[-1] > 1.0 and second[60] < 0.5 * first[60] and second[-1] < first[-1]
 
 
+@needs_numba
+def test_prints_in_a_world_that_is_turned_are_turned():
+    """By a quarter, of a box that tumbles."""
+    box = free('<geom type="box" size="0.05 0.03 0.02" mass="1e6"/>')
+    model = model_of(box, REMEMBERS.format(0.005))
+    prints = rft.mujoco.Footprints(0.01, 0.4, 0.4, repose=1.5)
+    grounds = []
+    for quarters in range(2):
+        yaw = Rotation.from_euler("z", 90 * quarters, degrees=True)
+        data = mujoco.MjData(model)
+        turn = yaw * Rotation.from_rotvec([0.5, -0.3, 0.4])
+        data.qpos[:] = [*yaw.apply([0.03, -0.04, 0.01]), *quaternion(turn)]
+        data.qvel[:] = [*yaw.apply([0.3, 0.2, -0.1]), 3.0, -2.0, 4.0]
+        with rft.mujoco.attach(model, MAP, rounding=0.01, footprints=prints) as sand:
+            mujoco.mj_step(model, data, 20)
+            grounds.append(np.rot90(sand.ground(data)[2], quarters))
+    assert np.ptp(grounds[0]) > 0.03
+    np.testing.assert_allclose(grounds[1], grounds[0], rtol=0, atol=1e-13)
+
+
 START = [0.5, 0.2, 0, 0, 0, 0]
 SMALL_PRINTS = {"rounding": 0.02, "footprints": rft.mujoco.Footprints(0.01, 0.4, 0.4)}
 
