@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 import rft
 from rft.balance import backend
 from rft.balance.backend import Note
-from rft.fits.plates import fit_stress
+from rft.fits.plates import ZetaFit, fit_stress
 from rft.terradynamics.ground import (
     DisturbedGround,
     GrainInertia,
@@ -573,6 +573,8 @@ def test_media_are_drawn_within_their_uncertainty():
     logs = np.log([x.xi_n / 3e5 for x in drawn])
     assert logs.std() == pytest.approx(0.1, rel=0.1) and abs(logs.mean()) < 0.01
     assert drawn == rft.mujoco.sample(Spatial(3e5), 2000, seed=2, spread=0.1)
+    scaled = rft.mujoco.sample(ZetaFit(0.5, 0.05, 30, *[None] * 3, 0.0, 0.0), 1000)
+    assert np.std([x.zeta for x in scaled]) == pytest.approx(0.05, rel=0.1)
     angles = np.meshgrid(*[np.radians(np.arange(-75, 90, 30))] * 2)
     beta, gamma = np.reshape(angles, (2, -1))
     noise = 0.02 * np.random.default_rng(1).normal(size=(2, beta.size))

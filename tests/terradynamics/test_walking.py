@@ -224,6 +224,19 @@ def test_a_walker_that_speeds_up_slowly_is_not_yet_periodic():
     assert 3 * found.twist[half, 0] < found.twist[-1, 0]
 
 
+def test_what_a_walk_takes_is_told_from_its_first_steps():
+    """Of a body so light that it bounces, and of one that takes many cycles to come to
+    the speed of its legs."""
+    scene = dataclasses.replace(QUICK_XPLORER, numerics=Fineness(duration=10.0))
+    light = dataclasses.replace(XPLORER.robot, mass=1e-6)
+    usual, bouncing, fast = (
+        walking.walk_cost(dataclasses.replace(scene, **changes)).balances
+        for changes in ({}, {"robot": light}, {"gait": Tripod(200.0)})
+    )
+    assert bouncing > 4 * usual
+    assert fast > 100 * usual
+
+
 def test_trends_of_figure_12():
     """Xplorer is faster at higher frequency, on c-legs than on flat ones, on flat than
     on reversed ones. SandBot is slower with more air, and at last no walker."""
