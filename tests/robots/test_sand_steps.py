@@ -393,17 +393,24 @@ def test_a_geom_that_changes_stops_the_sand_with_a_line(solved_by):
 
 @needs_numba
 def test_the_error_of_a_run_covers_steps_and_elements():
-    """Of a thrown ball, against steps and elements an eighth as long; data stay."""
+    """Of a ball that its control throws, against steps and elements an eighth as long;
+    data stay."""
     ball = free(0.05, '<geom type="sphere" size=".03" mass=".2"/>')
+
+    def throw(model, data):
+        if data.time == 0.0:
+            data.qvel[0] = 1.0
+
     ends = []
     for step, length in ((0.002, None), (0.00025, 0.0025)):
         model = model_of(ball, step)
         data = mujoco.MjData(model)
-        data.qvel[0] = 1.0
         with rft.mujoco.attach(model, LOOSE, element=length) as sand:
             if not ends:
-                error = sand.error(data, 0.5, lambda model, data: None)
-                assert data.time == 0.0 and data.qvel[0] == 1.0
+                error = sand.error(data, 0.5, throw)
+                assert data.time == data.qvel[0] == 0.0
+            throw(model, data)
             ends.append(after(model, data, 0.5)[:3])
     true = np.linalg.norm(ends[0] - ends[1])
     assert 0.5 * true < error.step + error.elements < 4.0 * true
+    assert error.moved > 0.1 and min(error.step, error.elements) > 0.0
