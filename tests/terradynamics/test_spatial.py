@@ -223,6 +223,8 @@ SIDES = np.array([
 ])  # fmt: skip
 TURNED = np.concatenate([SIDES[:-1], SIDES[-1:, ::-1]])
 DOUBLED = np.concatenate([SIDES, SIDES[:1]])
+WITHIN = np.concatenate([CUBE, CUBE / 2 + 0.002])
+HOLLOW = np.concatenate([SIDES, SIDES[:, ::-1] + len(CUBE)])
 LINE = np.concatenate([SIDES[:-1], [(1, 1, 3)]])
 BALL = shapes.sphere(0.02, 1)
 REFUSED = [
@@ -230,6 +232,7 @@ REFUSED = [
     (lambda: Mesh(CUBE, SIDES[:, ::-1]), "inside out: its normals point inwards"),
     (lambda: Mesh(CUBE, TURNED), "run along the same way"),
     (lambda: Mesh(CUBE, DOUBLED), "doubles"),
+    (lambda: Mesh(WITHIN, HOLLOW), "lies inside"),
     (lambda: Mesh(CUBE, LINE), "no area"),
     (lambda: Mesh(CUBE * np.nan, SIDES), "finite"),
     (lambda: Mesh(CUBE[:-1], SIDES), "names vertex 7"),
