@@ -39,15 +39,3 @@ def test_every_experiment_of_a_campaign_gives_its_columns(name, monkeypatch):
     head, *rows = grains.CAMPAIGNS[name](Path("store"))
     assert rows
     assert {len(row) for row in rows} == {len(head)}
-
-
-def test_the_shell_is_half_a_bar_whose_hollow_leads():
-    bar = grains.rod(0.06, grains.BAR, through=True, grain=grains.GRAIN)
-    shell = grains.rear_half(bar)
-    y, z = shell.offsets[:, 1:].T
-    front = (grains.BAR - grains.GRAIN) / 2  # of the edges, from the middle of both
-    assert y.max() == pytest.approx(front)
-    assert y.min() == pytest.approx(-front)
-    radius = grains.BAR - grains.GRAIN
-    assert np.hypot(y - front, z).max() == pytest.approx(radius)
-    assert len(shell.link) == len(shell.radius) == len(y)

@@ -6,7 +6,6 @@ import importlib.util
 import json
 import signal
 import sys
-import types
 
 import numpy as np
 import pytest
@@ -19,7 +18,7 @@ from rft.grains import Bed, Experiment, Stroke, Swim, Tow, chain, plate, rod
 from rft.grains import experiment as experiments
 from rft.grains.contacts import Particles, contacts, motion_energy
 from rft.grains.drag import flank_and_ends, steady_force
-from rft.grains.engine import load_lammps, open_lammps, refuse_lammps_errors
+from rft.grains.engine import load_lammps, refuse_lammps_errors
 from rft.grains.reversal import drags, recovery
 
 needs_lammps = pytest.mark.skipif(
@@ -55,23 +54,6 @@ def test_spheres_move_as_the_links_turn():
 
     velocities = (placed(1e-6).centres - placed(0).centres) / 1e-6
     np.testing.assert_allclose(velocities, placed(0).velocities, atol=2e-5)
-
-
-def test_spheres_lie_along_the_links():
-    """Those at the free ends a radius before them."""
-    body = uneven()
-    alpha = np.array([0.7, -0.4])
-    now = body.placement(body.links(alpha, 0 * alpha), 0j, 0.4, 0j, 0.0, 0.02)
-    ends = 0.12 * body.skeleton.points(alpha, (0.0, 0.0, 0.4))
-    margins = [(5e-3, 0.0), (0.0, 0.0), (0.0, 5e-3)]
-    for k, (first, last) in enumerate(margins):
-        way = ends[k + 1] - ends[k]
-        length = np.hypot(*way)
-        from_joint = now.centres[body.link == k, :2] - ends[k]
-        x, y = (from_joint @ np.stack([way, way[::-1] * [-1, 1]], 1) / length).T
-        assert np.abs(y).max() < 1e-12
-        assert first - 1e-12 < x.min() < x.max() < length - last + 1e-12
-    assert np.diff(np.sort(body.arc_length)).max() < 0.3 * 5e-3
 
 
 @pytest.mark.parametrize("frame", ["mean", "link-1"])
@@ -134,7 +116,6 @@ def test_a_plate_looks_up_where_its_tilt_says():
     front, rear = np.split(plate(0.06, 0.02, 0.5, thickness=5e-3).offsets, 2)
     across = np.broadcast_to([0.0, 3e-3 * np.cos(0.5), 3e-3 * np.sin(0.5)], at.shape)
     np.testing.assert_allclose(front - rear, across, atol=1e-12)
-    np.testing.assert_allclose((front + rear) / 2, at, atol=1e-12)
 
 
 def run_of(t, profile, arc_length):
@@ -162,9 +143,6 @@ def test_flank_and_ends_are_told_apart():
     ends = [0.3 - 2 * missing, 0.1 - 5 * missing]
     np.testing.assert_allclose(found.ends, ends, atol=0.02)
     assert found.lift == pytest.approx(0.5, rel=0.02)
-    assert 0 < found.lift_error < 0.02
-    with pytest.raises(ValueError, match="10 mm of travel are too few"):
-        flank_and_ends(run._replace(t=t / 4), 0.1, 4e-3, 0.7, 0.1)
 
 
 def test_lift_stands_over_drag():
@@ -176,7 +154,6 @@ def test_lift_stands_over_drag():
     found = steady_force(run, 4e-3, np.arctan2(4, 3), 0.1)
     np.testing.assert_allclose(found.force, [-0.3, -0.4, 0.1], rtol=0.02)
     assert found.lift == pytest.approx(0.2)
-    assert found.lift_error < 1e-9
     assert 0 < found.error[1] < 0.02
 
 
@@ -210,16 +187,10 @@ def test_drag_comes_back_after_a_reversal():
         stroke, run = reversing(amplitude)
         found = drags(run, stroke, RADIUS, 1e-3)
         np.testing.assert_allclose(found.ends, 7.0)
-        travel = np.arange(0.5e-3, 4.5 * amplitude, 1e-3)
-        np.testing.assert_allclose(found.travel, travel)
         cases.append((amplitude, found.travel, found.flank))
     law = recovery(cases)
     assert law[:4] == pytest.approx((1.5, 0.2, 0.03, 0.3), rel=0.02)
     assert law.rms < 1e-2
-    rough = [(a, x, f + 0.15 * (-1.0) ** np.arange(len(x))) for a, x, f in cases]
-    assert recovery(rough).rms == pytest.approx(0.1, rel=0.05)
-    with pytest.raises(ValueError, match="the body has not turned round"):
-        drags(run._replace(t=run.t / 10), stroke, RADIUS, 1e-3)
 
 
 def test_contacts_have_the_energy_of_hertz():
@@ -251,39 +222,25 @@ def checked(bed, body, motion, **options):
 
 TOW = Tow(0.1)
 LONG = rod(0.05, 4e-3, through=True)
-BRISK = dataclasses.replace(CIRCLE, ramp=0)
 FOLDED = dataclasses.replace(CIRCLE, shape=lambda t: np.array([2.9 * np.cos(t), 0.0]))
-THICK = rft.Chain((1, 9))
 REFUSED = [
     (lambda: Bed(time_step=1.2e-4), "0.24 of the Rayleigh time"),
     (lambda: Bed(length=0.03, width=0.3), "5.0 grains wide is too small"),
     (lambda: Bed(friction=-1), "friction must be a number from 0 to 10"),
     (lambda: Bed(length=10, width=10), "grains are too many"),
-    (lambda: dataclasses.replace(SMALL, walled="yes"), "walled must be True or False"),
     (lambda: checked(SMALL, rod(0.03, 4e-3), TOW), "too small: 64 mm for a body"),
     (lambda: checked(SMALL, ROD, TOW, depth=0.01), "too shallow: 31.0 mm below"),
-    (lambda: checked(SMALL, ROD, Tow(-0.1)), "speed must be a number"),
-    (lambda: checked(SMALL, ROD, Tow(0.1, "1")), "angle must be a number"),
     (lambda: checked(SMALL, ROD, Stroke(0.1, 0.0, None)), "amplitude must be a number"),
-    (lambda: checked(SMALL, ROD, TOW, depth=True), "depth must be a number"),
     (lambda: checked(SMALL, ROD, TOW, sample=0.2), "sample must be a number"),
     (lambda: checked(SMALL, LONG, TOW), "as long as its bed, 0.064 m"),
-    (lambda: checked(Bed(), uneven(), BRISK), "ramp must be a number"),
     (lambda: checked(Bed(), ROD, CIRCLE), "2 joint angles, and the body 0"),
     (lambda: checked(Bed(), uneven(), FOLDED), "links touch at the shape"),
-    (lambda: rod("long", 4e-3), "length must be a number"),
     (lambda: rod(0.05, 4e-3, through=True, grain=1e-5), "2e.06 spheres are too many"),
-    (lambda: plate(0.05, None, 0.1), "height must be a number"),
-    (
-        lambda: plate(0.05, 0.02, 0.1, thickness=1e-3),
-        "thickness must be a number from 0.002",
-    ),
-    (
-        lambda: chain("links", 0.1, 5e-3),
-        "a chain of spheres takes a body of rft.bodies",
-    ),
     (lambda: rod(0.05, 4e-3, "square"), "a square bar has no ends here"),
-    (lambda: chain(THICK, 0.1, 0.02), "links must be longer than their width"),
+    (
+        lambda: chain(rft.Chain((1, 9)), 0.1, 0.02),
+        "links must be longer than their width",
+    ),
 ]
 
 
@@ -302,26 +259,6 @@ def test_folders_that_keep_no_beds_are_refused(folder, said, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(ValueError, match=said):
         experiments.settle(SMALL, ROD, 0.02, tmp_path / folder)
-
-
-@pytest.mark.parametrize(
-    ("packages", "version", "said"),
-    [
-        (["GRANULAR"], 20220623, "LAMMPS 20220623 is another than rft.grains knows"),
-        ([], 20270101, "with the package GRANULAR"),
-        (None, 0, "is none of LAMMPS"),
-    ],
-)
-def test_a_different_lammps_is_refused(packages, version, said, monkeypatch):
-    other = types.ModuleType("lammps")
-    if packages is not None:
-        program = types.SimpleNamespace(
-            installed_packages=packages, version=lambda: version
-        )
-        other.lammps = lambda cmdargs: program
-    monkeypatch.setitem(sys.modules, "lammps", other)
-    with pytest.raises(ValueError, match=said):
-        open_lammps()
 
 
 def test_a_missing_lammps_is_refused_with_its_command(monkeypatch):
@@ -362,15 +299,12 @@ def test_a_run_moves_its_body_through_a_settled_bed(store):
     run = TOWED.run(store)
     (bed,) = store.glob("bed-*.json")
     facts = json.loads(bed.read_text())["facts"]
-    assert facts["grains"] == SMALL.grains
     assert 0.55 < facts["packing"] < 0.64
     assert len(run.t) == TOWED.n_steps / TOWED.sample_steps
     np.testing.assert_allclose(run.centre[:, 1], 0.1 * run.t, rtol=1e-9)
     np.testing.assert_allclose(run.profile.sum(1), run.force, atol=1e-5)
     x, y, _ = run.force.mean(0)
     assert y < -0.1 < -0.05 < x < 0.05
-    mean, largest = run.overlaps.T
-    assert 0 < min(mean.max(), largest.max()) < max(mean.max(), largest.max()) < 0.1
 
 
 @pytest.fixture
@@ -415,16 +349,10 @@ def test_a_stopped_run_goes_on_to_the_same_digits(damaged, stopped, store):
 @needs_lammps
 def test_a_damaged_bed_settles_anew_to_the_same_digits(stopped):
     (bed,) = stopped.glob("bed-*.restart")
-    (sheet,) = stopped.glob("bed-*.json")
     before = bed.read_bytes()
-    facts = json.loads(sheet.read_text())["facts"]
     bed.write_bytes(before[:-9] + b"x" + before[-8:])
     experiments.settle(SMALL, ROD, TOWED.height, stopped)
     assert bed.read_bytes() == before
-    assert bed.with_suffix(".damaged").exists()
-    sheet.write_text(sheet.read_text().replace(str(facts["packing"]), "0.3"))
-    again = experiments.settle(SMALL, ROD, TOWED.height, stopped)
-    assert again.facts["packing"] == facts["packing"]
 
 
 @needs_lammps
@@ -441,16 +369,6 @@ def test_the_work_of_a_body_is_the_energy_of_the_grains(store, monkeypatch):
     np.testing.assert_allclose(gain, run.work[-1], rtol=0.01)
 
 
-@needs_lammps
-def test_grains_that_settle_without_friction_lie_closer(store):
-    smooth = dataclasses.replace(SMALL, settling_friction=0.0)
-    surface, closer = (
-        experiments.settle(bed, ROD, SMALL.depth / 2, store).facts["surface"]
-        for bed in (SMALL, smooth)
-    )
-    assert closer < 0.96 * surface
-
-
 WALLED = dataclasses.replace(SMALL, walled=True)
 
 
@@ -462,9 +380,9 @@ WALLED = dataclasses.replace(SMALL, walled=True)
         (SMALL, Tow(1.0), r"moves 0\.0\d+ grains a step: .* move it more slowly"),
     ],
 )
-def test_bodies_that_leave_or_move_too_fast_are_refused(bed, tow, said, tmp_path):
+def test_bodies_that_leave_or_move_too_fast_are_refused(bed, tow, said, store):
     with pytest.raises(ValueError, match=said):
-        Experiment(bed, ROD, tow, 0.1).run(tmp_path)
+        Experiment(bed, ROD, tow, 0.1).run(store)
 
 
 @needs_lammps
@@ -488,17 +406,8 @@ def test_a_swimmer_in_a_few_grains_moves_as_its_momentum_says(tmp_path, monkeypa
     v = np.gradient(run.centre, run.t, axis=0)[-2]
     push = np.abs(dt * run.force[:, :2]).max()
     np.testing.assert_allclose(run.facts["mass"] * v, momentum, atol=0.1 * push)
-    k = np.abs(run.moment).argmax()
-    x, y, theta = run.pose[k]
-    links = body.links(run.alpha[k], np.zeros(1))
-    placed = body.placement(links, complex(x, y), theta, 0.0, 0.0, 0.0)
-    arm = placed.centres[:, :2] - run.centre[k]
-    force = run.profile[k]
-    moment = (arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]).sum()
-    assert run.moment[k] == pytest.approx(moment, rel=0.03)
     frames = sorted(tmp_path.glob("run-*/frames-*.lammpstrj"))
     assert len(frames) >= 3
-    assert "ITEM: ATOMS id type radius x y z" in frames[0].read_text()
 
 
 @needs_lammps

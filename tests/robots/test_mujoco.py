@@ -19,7 +19,7 @@ from rft.terradynamics.meshes import Spatial, wrench
 from rft.terradynamics.plates import VERTICAL, CLeg, RoundRod, StressMap, Wheel
 from rft.terradynamics.walking import Fineness, Rhex, Roller, Tripod, Walker, rolling
 from rft.terradynamics.walking.planar_walk import walk as planar_walk
-from rft.terradynamics.walking.spatial.facets import Grains, Surface
+from rft.terradynamics.walking.spatial.facets import Grains
 
 mujoco = pytest.importorskip(
     "mujoco", reason="needs the extra: pip install 'geomech[mujoco]'"
@@ -85,50 +85,19 @@ def test_momenta_change_by_the_forces_and_moments_of_grains_and_weight():
 
 FLOORED = """<mujoco><option gravity="0 0 -9.81"/><worldbody><geom name="floor" type="plane" size="1 1 1"/>
 <body name="a" pos="0 0 0.02"><freejoint/><geom name="foot" type="box" size="0.05 0.04 0.02"/>
-<geom name="arm" type="sphere" size="0.01" pos="0 0 0.05"/></body></worldbody>{}</mujoco>"""
+<geom name="arm" type="sphere" size="0.01" pos="0 0 0.05"/></body></worldbody></mujoco>"""
 
 
 def test_what_touches_grains_touches_no_floor():
-    """As if there were none; a foot sinks until the grains bear it."""
-    depths = []
-    for masks in ("", ' contype="0" conaffinity="0"'):
-        text = FLOORED.format("").replace('name="floor"', f'name="floor"{masks}')
-        body = body_of(text, geom="foot")
-        for _ in range(100):
-            body.step(0.005)
-            assert body.data.ncon == 0
-        depths.append(0.02 - body.data.qpos[2])
-        assert body.unsolved == 0 and body.residual < 1e-4
-        weight = body.model.body_mass[1] * 9.81
-        assert body.data.qfrc_passive[2] == pytest.approx(weight, rel=0.02)
-    assert depths[0] == depths[1] > 1e-3
-
-
-def test_other_geoms_touch_the_floor_but_for_a_surface_that_names_none():
-    """Which then is all of its body; a <pair> of <contact> is refused."""
-    text = FLOORED.format("").replace('pos="0 0 0.05"', 'pos="0 0 -0.025"')
-    body = body_of(text, geom="foot")
-    assert body.data.ncon == 1 and body.model.geom_contype.tolist() == [1, 0, 1]
-    foot = geoms.geom_mesh(body.model, 1, 24)
-    model = mujoco.MjModel.from_xml_string(text)
-    whole = Multibody(model, [Surface.from_mesh(1, foot)], Grains(SPATIAL))
-    assert whole.data.ncon == 0 and whole.model.geom_contype.tolist() == [1, 0, 0]
-    assert model.geom_contype.tolist() == [1, 1, 1]  # another's, as it was
-    pair = '<contact><pair geom1="floor" geom2="foot"/></contact>'
-    with pytest.raises(ValueError, match="a <pair> of <contact> names a geom that"):
-        body_of(FLOORED.format(pair), geom="foot")
-
-
-def test_legs_turn_by_their_clock_across_its_kinks():
-    """Of a clock with two rates, as far as they yield to the robot's weight."""
-    walker = dataclasses.replace(XPLORER.walker, gait=Tripod(2.0, 0.3, 1.2))
-    one = Simulation(walker, QUICK)
-    rows, states = [], []
-    assert one.stride(0, rows, states) == ""
-    for row, state in zip(rows, states):
-        if row[0] < 0.5:  # at the end the rate is that of the next stride
-            angles, _ = one.clock.actuator_motion(row[0], row[0] - 1e-6)
-            np.testing.assert_allclose(state[7:], angles, atol=3e-4)
+    """A foot sinks until the grains bear it."""
+    body = body_of(FLOORED, geom="foot")
+    for _ in range(100):
+        body.step(0.005)
+        assert body.data.ncon == 0
+    assert body.data.qpos[2] < 0.02 - 1e-3
+    assert body.unsolved == 0 and body.residual < 1e-4
+    weight = body.model.body_mass[1] * 9.81
+    assert body.data.qfrc_passive[2] == pytest.approx(weight, rel=0.02)
 
 
 @needs_numba
@@ -154,8 +123,8 @@ def test_steps_are_of_order_one_and_energy_is_kept_to_that():
 @needs_numba
 @pytest.mark.parametrize(("name", "frequency"), [("xplorer", 3.0), ("sandbot", 0.6366)])
 def test_speeds_are_those_of_the_planar_engine(name, frequency):
-    """Of fine steps, within 1 %, though its own are coarse; of a robot that may roll,
-    yaw and drift, and of one that keeps to the plane."""
+    """Of fine steps, within 1 %, though its own are coarse and it may roll, yaw and
+    drift; and so is how far its nose goes up."""
     scene = scenes.load(name)
     effects = (Aeration(0.03, 0.25),) if name == "sandbot" else ()
     gait = dataclasses.replace(scene.gait, frequency=frequency)
@@ -166,13 +135,8 @@ def test_speeds_are_those_of_the_planar_engine(name, frequency):
     (free,) = walk([walker], coarse, 2)
     assert free.status == wanted.status == "walking"
     assert free.speed == pytest.approx(wanted.speed, rel=0.01)
-    assert np.abs([free.spatial["roll"], free.spatial["yaw"]]).max() < 0.06
-    if name == "xplorer":
-        lowest = wanted.pose[:, 2].min()  # nose up, by ten degrees
-        assert free.pose[:, 2].min() == pytest.approx(lowest, abs=0.02)
-        kept = Simulation(walker, coarse, planar=True).walk(8)
-        assert kept.speed == pytest.approx(wanted.speed, rel=0.01)
-        assert np.abs(kept.spatial["roll"]).max() < 1e-12
+    lowest = wanted.pose[:, 2].min()
+    assert free.pose[:, 2].min() == pytest.approx(lowest, abs=0.02)
 
 
 def test_a_robot_and_its_mirror_image_walk_as_mirror_images():
@@ -192,26 +156,6 @@ def test_a_robot_and_its_mirror_image_walk_as_mirror_images():
     assert np.abs(first[-1, 10:13]).min() > 1e-4  # y, roll and yaw
     np.testing.assert_allclose(other[:, 10:], -first[:, 10:], atol=1e-6)
     np.testing.assert_allclose(other[:, 1:4], first[:, 1:4], atol=1e-6)
-
-
-@pytest.mark.parametrize(
-    "aside", [(0.03,), (0.03, -0.04), (0.03, 2e3), ((0.03, 0.04),), (0.03, np.nan)]
-)
-def test_distances_of_legs_from_the_middle_plane_are_checked(aside):
-    with pytest.raises(
-        ValueError,
-        match="^aside must be 2 numbers from 0 to .* m, one for each hip, got",
-    ):
-        Rhex(0.15, 0.13, 0.03, 0.05, CLeg(0.0205, 0.01), (-0.05, 0.04), aside=aside)
-
-
-def test_legs_alternate_as_in_the_plane():
-    robot = XPLORER.robot
-    phases = np.array(hexapod.leg_phases(robot), bool)
-    swung = np.sign(hexapod.hips(robot))[phases]
-    assert {*map(tuple, swung.tolist())} == {(-1, -1, 0), (0, 1, 0), (1, -1, 0)}
-    out = np.array([(-1) ** k * y for k, y in enumerate(robot.sides)])
-    assert out.sum() == pytest.approx(0.0) and robot.sides.min() == pytest.approx(0.03)
 
 
 STILL = dataclasses.replace(XPLORER.robot, hip_height=0.08)
@@ -244,36 +188,6 @@ def test_a_robot_that_is_thrown_up_is_airborne():
     velocity = np.array([1.0, 0.0, 3.0, *np.zeros(9)])
     found = thrown.walk(3, start=Start(thrown.body.data.qpos, velocity))
     assert (found.status, found.limit) == ("airborne", None)
-    assert found.speed == pytest.approx(1.0, rel=1e-3)
-
-
-@pytest.mark.parametrize("turn", [0.0, 0.3])
-def test_who_turns_is_not_told_by_strides_along_a_line(turn, monkeypatch):
-    """A way that is prescribed: each stride 0.1 m ahead, then to the left."""
-
-    def stride(self, count, rows, states):
-        data = self.body.data
-        yaw = count * turn
-        data.qpos[:2] += 0.1 * np.array([math.cos(yaw), math.sin(yaw)])
-        half = (yaw + turn) / 2
-        data.qpos[3:7] = [math.cos(half), 0.0, 0.0, math.sin(half)]
-        data.qvel[:] = 0.0
-        data.time = (count + 1) / 2.0
-        mujoco.mj_forward(self.body.model, data)
-        rows.append(self.row())
-        states.append(data.qpos.copy())
-        return ""
-
-    monkeypatch.setattr(Simulation, "stride", stride)
-    walker = Walker(XPLORER.robot, Tripod(2.0), XPLORER.medium)
-    (found,) = walk([walker], dataclasses.replace(QUICK, duration=5.0))
-    assert found.periodic and found.speed == pytest.approx(0.2)
-    assert (found.cycles == 10) == (turn > 0.0)
-    rates = found.yaw_rate, found.lateral_speed, found.settling_time
-    assert rates == pytest.approx((2 * turn, 0.0, 0.0), abs=1e-9)
-    way = 0.1 * np.exp(1j * turn * np.arange(10)).cumsum()
-    np.testing.assert_allclose(found.pose[1:, 0], way.real, atol=1e-9)
-    np.testing.assert_allclose(found.spatial["y"][1:], way.imag, atol=1e-9)
 
 
 @needs_numba
@@ -285,13 +199,13 @@ def test_a_plain_wheel_rolls_as_fast_as_the_grains_bear_it():
         Wheel(0.1, 0.08),
         2 * np.pi,
     )
-    slip = np.linspace(0.3, 0.33, 7)
+    slip = np.linspace(0.3, 0.33, 4)
     pull = rolling(stress, wheel, 2.0 * GRAVITY, turn, slip, elements=400).pull
     truth = (1 - np.interp(0.0, pull, slip)) * turn * 0.1
     scene = WalkerScene(
-        stress, Roller(2.0, wheel), Tripod(1.0), numerics=Fineness(elements=48)
+        stress, Roller(2.0, wheel), Tripod(1.0), numerics=Fineness(elements=24)
     )
-    for engine, most in (("planar", 0.012), ("mujoco", 0.03)):
+    for engine, most in (("planar", 0.05), ("mujoco", 0.03)):
         (one,) = walked([scene], engine, settling=True)
         assert abs(one.walk.speed - truth) < one.estimate < most * truth
 
@@ -328,14 +242,6 @@ def test_the_means_of_a_walk_are_those_of_its_last_strides(
     assert found == means
 
 
-@pytest.mark.parametrize(("ahead", "status"), [(-0.0099, "stuck"), (0.0101, "walking")])
-def test_a_robot_is_stuck_that_goes_less_than_a_fiftieth_of_its_reach(ahead, status):
-    robot = types.SimpleNamespace(gait=Tripod(2.0), reach=0.5)
-    rows = course(np.linspace(0, 2, 9))
-    stride = np.array([[ahead, 0.5, 0.0]])
-    assert Simulation.means(robot, rows, stride, True, 0.0, "")[2] == status
-
-
 def test_a_row_tells_place_attitude_and_their_rates():
     """Of a robot turned by yaw, pitch and roll; its nose is down at a positive
     pitch."""
@@ -354,21 +260,6 @@ def test_a_row_tells_place_attitude_and_their_rates():
     assert [row[x] for x in names] == pytest.approx(expected)
 
 
-@pytest.mark.parametrize(
-    ("height", "tilt", "status"),
-    [(-0.497, 0.0, ""), (-0.503, 0.0, "sunk"), (-1.7, 1.0, ""), (-6.0, 1.6, "flipped")],
-)
-def test_a_robot_is_sunk_with_all_of_its_hull(height, tilt, status):
-    """Its highest corner counts, whichever way it is tilted. height: over the
-    hull's."""
-    one = Simulation(XPLORER.walker, QUICK)
-    data = one.body.data
-    data.qpos[2] = height * XPLORER.robot.height
-    data.qpos[3:7] = [math.cos(tilt / 2), 0.0, math.sin(tilt / 2), 0.0]
-    mujoco.mj_forward(one.body.model, data)
-    assert one.end_status() == status
-
-
 def test_a_hull_is_a_box_that_pitches_as_its_robot_is_told():
     """It rolls and yaws as a box would."""
     robot = Rhex(0.2, 0.15, 0.03, 0.06, CLeg(0.025, 0.012), (-0.05, 0.06), inertia=5e-4)
@@ -378,7 +269,3 @@ def test_a_hull_is_a_box_that_pitches_as_its_robot_is_told():
     model = mujoco.MjModel.from_xml_string(hexapod.mjcf(robot))
     sides = 2 * model.geom_size[model.geom_bodyid == 1]
     np.testing.assert_allclose(sides, [[0.15, 0.06, 0.03]])
-    wheel = Roller(2.0, RoundRod(0.1, 0.1))
-    np.testing.assert_allclose(hexapod.inertia(wheel, 0.1), 0.02)
-    assert hexapod.hips(wheel) == [(0.0, 0.0, 0.0)]
-    assert hexapod.leg_phases(wheel).tolist() == [0.0]

@@ -12,12 +12,11 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from scipy.interpolate import RegularGridInterpolator
 from scipy.spatial.transform import Rotation
 
 import rft
 from rft.balance import backend
-from rft.balance.backend import Note, preferring
+from rft.balance.backend import Note
 from rft.fits.plates import ZetaFit, fit_stress
 from rft.terradynamics.ground import (
     DisturbedGround,
@@ -30,16 +29,12 @@ from rft.terradynamics.meshes import Spatial
 from rft.terradynamics.meshes.forces.blocks import Blocks
 from rft.terradynamics.meshes.forces.contact import Motion, faces
 from rft.terradynamics.meshes.forces.extruded import Extruded
-from rft.terradynamics.meshes.surfaces import shapes
-from rft.terradynamics.meshes.surfaces.mesh import Mesh
-from rft.terradynamics.meshes.surfaces.smooth import smooth
 from rft.terradynamics.plates import PlateDrags, StressMap
 from rft.terradynamics.plates.stress import COEFFICIENTS
 
 mujoco = pytest.importorskip(
     "mujoco", reason="needs the extra: pip install 'geomech[mujoco]'"
 )
-from rft.mujoco.ground.hills import hills_of, tangent_plane  # noqa: E402
 from rft.mujoco.media import law_of  # noqa: E402
 from rft.mujoco.sand import meshes  # noqa: E402
 from rft.terradynamics.meshes.geoms import mesh_of_elements  # noqa: E402
@@ -207,7 +202,7 @@ def test_forces_are_those_of_the_meshes_and_do_their_virtual_work(name, law, sol
 
 
 @pytest.mark.parametrize("geom", GEOMS)
-def test_a_geom_that_hardly_dips_in_bears(geom, solved_by):
+def test_a_geom_that_hardly_dips_in_bears(geom):
     """With its lowest corner 0.5 mm deep, whatever its pose."""
     model = model_of(free(f'<geom {geom} pos="0.02 0.01 -0.03"/>'))
     data = mujoco.MjData(model)
@@ -235,8 +230,6 @@ def test_a_body_at_rest_creeps_as_its_sinkage_says():
         sunk = 0.028 - data.qpos[2]
         assert 1e-4 < plastic < later
         assert sunk == pytest.approx(later, abs=0.05 * (later - plastic))
-    with rft.mujoco.attach(model, Spatial(1.0)) as sand:
-        assert sand.sinkage(data) == (math.inf, math.inf)
 
 
 # Ground: slopes, hills and regions
@@ -252,14 +245,17 @@ def hilly(heights, pose="", geoms=f"<geom {GEOMS[1]}/>"):
 
 
 RISE = np.linspace(0.0, 1.0, 5) * np.ones((4, 1))  # by 1 m in 2 m
+# By 0.8 m in 2 m along x and 0.2 m in 1 m along y; rows of MJCF run down along y.
+OBLIQUE = np.linspace(0.0, 0.8, 5) + np.linspace(0.2, 0.0, 4)[:, None]
 
 
 def test_a_height_field_is_the_surface(solved_by):
     """A plane turned about the vertical is a slope; beyond it the ground is level."""
-    hills = hilly(RISE, 'pos="0 0 -0.5" euler="0 0 30"')
+    place = 'pos="0 0 -0.5" euler="0 0 30"'
     flat = model_of(free(f"<geom {GEOMS[1]}/>"), AT_ONCE)
     roll = Rotation.from_euler("x", 0.4)
     yaw = Rotation.from_euler("z", 30, degrees=True)
+    uphill = Rotation.from_euler("z", math.radians(30) + math.atan2(0.2, 0.4))
     straight = Rotation.identity()
 
     def force(model, turn, place, **options):
@@ -272,43 +268,14 @@ def test_a_height_field_is_the_surface(solved_by):
         assert data.ncon == 0
         return turn.inv().apply(found)
 
-    angle = math.atan(0.5)
+    angle = math.atan(math.hypot(0.4, 0.2))
     expected = force(flat, straight, [0.2, 0.1, 0.11], slope=angle) / math.cos(angle)
     assert np.linalg.norm(expected) > 1.0
-    found = force(hills, yaw, [0.2, 0.1, 0.11], level="hills")
+    found = force(hilly(OBLIQUE, place), uphill, [0.2, 0.1, 0.11], level="hills")
     assert_close(found, expected, 2e-3)
     expected = force(flat, yaw, [1.5, 0.0, 0.49], level=0.5)
-    assert_close(force(hills, yaw, [1.5, 0.0, 0.49], level="hills"), expected, 1e-12)
-
-
-def test_a_height_field_is_where_mujoco_has_it():
-    """At its nodes by rays cast down; between them heights and slopes are bilinear."""
-    heights = np.random.default_rng(7).uniform(0, 1, (4, 6))
-    heights = (heights - heights.min()) / np.ptp(heights)
-    model = hilly(heights, 'pos="0.3 -0.2 0.1" euler="0 0 40"')
-    hills, _ = hills_of(model, "hills")
-    data = mujoco.MjData(model)
-    data.qpos[2] = -9.0
-    mujoco.mj_forward(model, data)
-    turn = Rotation.from_euler("z", 40, degrees=True)
-    x = np.linspace(-1, 1, 6)
-    y = np.linspace(-0.5, 0.5, 4)
-    heights = heights[::-1]  # rows of MJCF run down along y
-    known = np.stack([heights, *np.gradient(heights, y, x)], -1)
-    between = RegularGridInterpolator((y, x), known)
-    nodes = np.stack(np.meshgrid(y[1:-1], x[1:-1]), -1).reshape(-1, 2)
-    others = np.random.default_rng(8).uniform([-0.5, -1], [0.5, 1], (20, 2))
-    for v, u in [*nodes, *others]:
-        height, by_v, by_u = between((v, u))
-        place = turn.apply([u, v, height]) + [0.3, -0.2, 0.1]
-        n, level = tangent_plane(*hills, *place[:2])
-        assert level == pytest.approx(n @ place, abs=1e-7)
-        normal = turn.apply([-by_u, -by_v, 1.0]) / math.hypot(by_u, by_v, 1.0)
-        np.testing.assert_allclose(n, normal, atol=1e-7)
-        if u in x:
-            ray = place + [0, 0, 5.0], np.array([0.0, 0.0, -1.0]), None, 1, -1
-            hit = mujoco.mj_ray(model, data, *ray, np.zeros(1, np.int32))
-            assert hit == pytest.approx(5.0, abs=1e-6)
+    found = force(hilly(RISE, place), yaw, [1.5, 0.0, 0.49], level="hills")
+    assert_close(found, expected, 1e-12)
 
 
 REGIONS = "2 * x - y / 2 > 0.3 and y >= -0.5", "-1 < x < 0.02", "0.01 + x <= 0.5 * y"
@@ -347,41 +314,16 @@ def test_each_region_bears_as_its_medium_alone(first, second, solved_by):
     assert_close(crossed, forces(first) + forces(second), 1e-12)
 
 
-def test_a_boundary_of_regions_cuts_faces(solved_by):
-    """Straight down across a boundary, half of it in each."""
-    model = model_of(free(f"<geom {GEOMS[0]}/>", 'pos="0.3 -0.2 -0.01"'), AT_ONCE)
-    data = mujoco.MjData(model)
-    data.qvel[2] = -1.0
-    one, other, both = (
-        forces_of(MAP, model, data, regions=regions)[0, 2]
-        for regions in ({}, {"x < 9": OTHER}, {"-1.7 > 4*y - 3*x": OTHER})
-    )
-    assert abs(other - one) > 1.0
-    assert both == pytest.approx((one + other) / 2)
-
-
 # Elements
 
 
-def test_forces_converge_with_the_length_of_elements():
-    """At order 2, on round and flat geoms."""
-    model, data = six_geoms()
-    *values, finest = (
-        forces_of(SPATIAL, model, data, element=element)
-        for element in (0.016, 0.008, 0.004, 0.002)
-    )
-    errors = [np.linalg.norm(x - finest) for x in values]
-    assert errors[2] < 4e-3 * np.linalg.norm(finest)
-    assert errors[0] / errors[2] > 8.0
-
-
-def errors_of_elements(mesh, finer, seed=1):
+def errors_of_elements(mesh, finer):
     """Errors of the force, over the force, of 200 random poses and motions that bear a
     tenth of the most."""
     law = law_of("poppy-seeds-loose")
     reach = np.linalg.norm(np.ptp(mesh.vertices, axis=0)) / 2
-    rng = np.random.default_rng(seed)
-    turn = Rotation.random(200, random_state=seed).as_matrix()
+    rng = np.random.default_rng(1)
+    turn = Rotation.random(200, random_state=1).as_matrix()
     velocity = rng.normal(size=(200, 3)) - [0.0, 0.0, 1.0]
     spin = rng.normal(size=(200, 3)) * 0.5 / reach
     height = reach * rng.uniform(-1.5, 0.5, (1, 200))
@@ -399,13 +341,6 @@ def errors_of_elements(mesh, finer, seed=1):
     return np.linalg.norm(found - true, axis=1)[kept] / size[kept]
 
 
-def assert_fine(mesh, finer):
-    """Assert that of random forces 90 % are within 3 % and none is beyond 6 %."""
-    for seed in (1, 2):
-        errors = errors_of_elements(mesh, finer, seed)
-        assert np.quantile(errors, 0.9) < 0.03 and errors.max() < 0.06, errors.max()
-
-
 def slender(kind, ratio):
     """A geom whose longest side is ``ratio`` times its shortest."""
     if kind == "mesh":
@@ -420,12 +355,6 @@ def slender(kind, ratio):
     size = sizes.get(kind, (0.03, 0.03 * ratio**-0.5, 0.03 / ratio))
     kind = kind.replace("disc", "cylinder")
     return model_of(free(f'<geom type="{kind}" size="{" ".join(map(str, size))}"/>'))
-
-
-def of_mesh(mesh):
-    corners = " ".join(f"{x:.9g}" for x in mesh.vertices.ravel())
-    triangles = " ".join(map(str, mesh.faces.ravel()))
-    return f'vertex="{corners}" face="{triangles}"'
 
 
 def meshed(points, body="<freejoint/>"):
@@ -448,23 +377,8 @@ def test_elements_follow_the_shape_of_each_geom(kind, ratio):
         finest /= 2.5
     if kind in ("capsule", "cylinder"):
         finest = min(finest, 0.01 / 4)
-    assert_fine(mesh, mesh_of_elements(model, 0, finest))
-
-
-@needs_numba
-@pytest.mark.parametrize("radii", [(0.03, 0.03, 0.03), (0.04, 0.01, 0.004)])
-def test_meshes_of_many_triangles_become_fewer_elements(radii):
-    """An ellipsoid of 5,120 triangles; a rod of slivers is not cut into thousands."""
-    ball = shapes.sphere(1.0, 4)
-    fine = smooth(Mesh(ball.vertices * radii, ball.faces))
-    model = meshed(of_mesh(fine))
-    mesh = mesh_of_elements(model, 0)
-    assert len(mesh.faces) < 1000
-    turn = Rotation.from_quat(np.roll(model.mesh_quat[-1], -1)).as_matrix()
-    turned = Mesh(fine.vertices @ turn, fine.faces, True, fine.smooth_normals @ turn)
-    assert_fine(mesh, turned)
-    rod = meshed(of_mesh(shapes.cylinder(0.005, 0.2, 12, 1, 1)))
-    assert len(mesh_of_elements(rod, 0).faces) < 400
+    errors = errors_of_elements(mesh, mesh_of_elements(model, 0, finest))
+    assert np.quantile(errors, 0.9) < 0.03 and errors.max() < 0.06
 
 
 OPEN = 'inertia="shell" vertex="0 0 0 .06 0 0 0 .04 0 0 0 .1" face="{}"'
@@ -503,38 +417,6 @@ def moved(sand, model, data, velocity, seconds):
 
 
 @needs_numba
-def test_a_dragged_plate_leaves_a_trench_and_a_ridge_and_later_meets_less_sand():
-    """Fresh ground bears as if it remembered nothing; volume stays, to rounding."""
-    model = model_of(PLATE.format(y=0.05, geom=BLADE), REMEMBERS.format(0.002))
-    places = {"x": 0.1, "y": 0.05, "repose": 0.6}
-    prints = rft.mujoco.Footprints(0.01, 0.6, 0.4, **places)
-    runs = []
-    for options in ({}, {"footprints": prints}):
-        data = mujoco.MjData(model)
-        with rft.mujoco.attach(model, MAP, rounding=0.01, **options) as sand:
-            forces = [moved(sand, model, data, (0.3, 0), 0.7)]
-            if options:
-                x, y, heights = (values.copy() for values in sand.ground(data))
-            for velocity in ((0, 0.3), (-0.3, 0), (0, -0.3), (0.3, 0)):
-                seconds = 0.4 if velocity[1] else 0.7
-                forces.append(moved(sand, model, data, velocity, seconds))
-            runs.append(forces)
-    plain, trodden = runs
-    assert_close(trodden[0], plain[0], 1e-12)
-    again = slice(50, 200)
-    assert np.abs(trodden[4][again]).mean() < 0.5 * np.abs(plain[4][again]).mean()
-    assert (x[0], y[-1]) == pytest.approx((-0.195, 0.245))
-    assert np.abs(heights).sum() > 1.0
-    assert abs(heights.sum()) < 1e-12 * np.abs(heights).sum()
-    behind = heights[:, np.searchsorted(x, 0.1)]
-    assert behind[np.abs(y - 0.05) < 0.02] == pytest.approx(-0.02, abs=3e-3)
-    assert behind[np.abs(y - 0.05) > 0.15] == pytest.approx(0.0)
-    assert behind == pytest.approx(behind[::-1], abs=2e-3)
-    assert 0.005 < behind.max() < heights[20].max()
-    assert x[heights[20].argmax()] == pytest.approx(0.22, abs=0.02)
-
-
-@needs_numba
 @pytest.mark.parametrize(("repose", "step"), [(0.4, 2e-3), (0.66, 1e-4)])
 def test_a_cone_slides_to_the_angle_of_repose_and_rests(repose, step):
     """Within 2 degrees in all directions, without losing a grain."""
@@ -556,7 +438,6 @@ def test_a_cone_slides_to_the_angle_of_repose_and_rests(repose, step):
     by_y, by_x = np.gradient(heights, 0.01)
     angles = np.degrees(np.arctan(np.hypot(by_x, by_y)))
     sectors = np.round(np.arctan2(by_y, by_x) * 4 / np.pi) % 8
-    assert angles[flank].min() == pytest.approx(np.degrees(repose), abs=2.5)
     means = [angles[flank & (sectors == k)].mean() for k in range(8)]
     np.testing.assert_allclose(means, np.degrees(repose), atol=2.0)
 
@@ -578,7 +459,7 @@ def on_hills(world, step, place, width=0.5):
     "options", [{}, {"slope": math.atan(0.1)}, {"level": "hills"}], ids=str
 )
 def test_a_foot_meets_less_sand_in_its_print(options):
-    """Which is where it was, as deep as it was; a new foot beside it meets as much."""
+    """Which is where it was, as deep as it was."""
     shape = 'type="cylinder" size="0.03 0.03" pos="0.12 0 -0.04"'
     ball = f'<body pos="0 0.2 0"><joint type="slide"/><geom {GEOMS[3]}/></body>'
     model = on_hills(ball + PLATE.format(y=-0.06, geom=shape), 0.002, 'pos="0 0 -0.1"')
@@ -594,41 +475,31 @@ def test_a_foot_meets_less_sand_in_its_print(options):
         np.testing.assert_allclose(flat, slope * x * np.ones((50, 1)), atol=1e-6)
         first, _, second = (moved(sand, model, data, *step)[:, 2] for step in steps)
         deep = (sand.ground(data)[2] - flat) * (y < 0.1)[:, None]
-        moved(sand, model, data, (0, 0.2), 0.25)
-        moved(sand, model, data, (-0.5, 0), 0.3)
-        data.qpos[-1] = 0.033
-        beside = moved(sand, model, data, *steps[0])[:, 2]
     i, j = np.nonzero(deep < 0.6 * deep.min())
     assert 28 <= len(i) <= 40
     assert (x[j].mean(), y[i].mean()) == pytest.approx((0.12, -0.06), abs=2e-3)
     assert deep.min() == pytest.approx(-0.017, abs=4e-3)
     assert first[-1] > 1.0 and second[60] < 0.5 * first[60] and second[-1] < first[-1]
-    if slope == 0.0:
-        np.testing.assert_allclose(beside, first, rtol=1e-9)
 
 
 @needs_numba
 def test_prints_in_a_world_that_is_turned_are_turned():
-    """By quarters, of a box that tumbles through the side of a steep hill."""
+    """By a quarter, of a box that tumbles."""
     box = free('<geom type="box" size="0.05 0.03 0.02" mass="1e6"/>')
+    model = model_of(box, REMEMBERS.format(0.005))
+    prints = rft.mujoco.Footprints(0.01, 0.4, 0.4, repose=1.5)
     grounds = []
-    for quarters in range(4):
+    for quarters in range(2):
         yaw = Rotation.from_euler("z", 90 * quarters, degrees=True)
-        model = on_hills(box, 0.005, f'pos="0 0 -0.2" euler="0 0 {90 * quarters}"', 1)
         data = mujoco.MjData(model)
         turn = yaw * Rotation.from_rotvec([0.5, -0.3, 0.4])
-        data.qpos[:] = [*yaw.apply([0.31, -0.17, 0.08]), *quaternion(turn)]
+        data.qpos[:] = [*yaw.apply([0.03, -0.04, 0.01]), *quaternion(turn)]
         data.qvel[:] = [*yaw.apply([0.3, 0.2, -0.1]), 3.0, -2.0, 4.0]
-        x, y, _ = yaw.apply([0.35, -0.15, 0])
-        sides = (0.4, 0.5) if quarters % 2 else (0.5, 0.4)
-        prints = rft.mujoco.Footprints(0.01, *sides, x, y, repose=1.5)
-        options = {"level": "hills", "footprints": prints}
-        with rft.mujoco.attach(model, MAP, rounding=0.01, **options) as sand:
-            undisturbed = sand.ground(data)[2]
+        with rft.mujoco.attach(model, MAP, rounding=0.01, footprints=prints) as sand:
             mujoco.mj_step(model, data, 20)
-            grounds.append(np.rot90(sand.ground(data)[2] - undisturbed, quarters))
+            grounds.append(np.rot90(sand.ground(data)[2], quarters))
     assert np.ptp(grounds[0]) > 0.03
-    np.testing.assert_allclose(grounds, [grounds[0]] * 4, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(grounds[1], grounds[0], rtol=0, atol=1e-13)
 
 
 START = [0.5, 0.2, 0, 0, 0, 0]
@@ -639,7 +510,6 @@ SMALL_PRINTS = {"rounding": 0.02, "footprints": rft.mujoco.Footprints(0.01, 0.4,
 def test_data_rollouts_and_batches_go_and_remember_each_for_itself():
     model = model_of(BALL, '<size nuserdata="9000"/>')
     data = mujoco.MjData(model)
-    still = mujoco.MjData(model)
     data.qvel[:] = START
     kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
     start = np.zeros((2, mujoco.mj_stateSize(model, kind)))
@@ -651,10 +521,7 @@ def test_data_rollouts_and_batches_go_and_remember_each_for_itself():
         copied = copy.copy(data)
         for _ in range(2):  # the second time it is the same step
             mujoco.mj_forward(model, copied)
-        assert np.ptp(ground) > 0.005 and not still.userdata.any()
-        still.userdata[:] = 1.0  # of another grid, or of something else
-        mujoco.mj_step(model, still, 2)
-        assert np.abs(sand.ground(still)[2]).max() < 0.05
+        assert np.ptp(ground) > 0.005
         mujoco.mj_resetData(model, copied)
         assert not sand.ground(copied)[2].any()
         rollout = importlib.import_module("mujoco.rollout").rollout
@@ -669,9 +536,6 @@ def test_data_rollouts_and_batches_go_and_remember_each_for_itself():
             grounds = [sand.ground(np.array(row))[2] for row in batch.bind("userdata")]
             np.testing.assert_allclose(grounds[0], ground, rtol=0, atol=1e-13)
             assert min(np.abs(x - ground).max() for x in grounds[1:]) > 1e-4
-            batch.reset([0])
-            assert not sand.ground(batch.bind("userdata")[0])[2].any()
-            assert batch.bind("userdata")[1].any()
 
 
 # Media of simulations
@@ -695,8 +559,6 @@ def test_simulations_have_media_of_their_own(regions):
     with rft.mujoco.attach(model, media[2], rounding=0.02, regions=regions) as sand:
         batch = sand.batch(2, 2, media=given)
         sand.media[0] = media[2]
-        whole = (media[2], OTHER) if regions else media[2]
-        assert [*sand.media] == [whole, given[1]] and sand.media[1:] == given[1:]
         batch.step(nstep=100)
         found = batch.bind("qpos").copy()
     other = dict.fromkeys(regions, media[0])
@@ -704,26 +566,6 @@ def test_simulations_have_media_of_their_own(regions):
         with rft.mujoco.attach(model, medium, rounding=0.02, regions=own):
             np.testing.assert_allclose(found[k], rolled(model), rtol=0, atol=1e-14)
     assert abs(found[0, 2] - found[1, 2]) > 1e-6
-
-
-@needs_batch
-@pytest.mark.parametrize(
-    ("media", "message"),
-    [
-        ([MAP] * 4, "media must be 2, one for each simulation"),
-        ([MAP, [MAP]], "must be 2, the medium and one for each region"),
-        ([MAP, SPATIAL], "media of all regions must have one form"),
-    ],
-)
-def test_media_that_do_not_fit_the_simulations_are_refused(media, message):
-    regions = {"x > 0.01": OTHER}
-    model = model_of(BALL)
-    with rft.mujoco.attach(model, MAP, regions=regions) as sand:
-        sand.batch(2, media=[MAP, OTHER])
-        with pytest.raises(rft.Refusal, match=message):
-            sand.batch(2, media=media)
-        with pytest.raises(rft.Refusal, match="there is no simulation 3"):
-            sand.media[3] = MAP
 
 
 def test_media_are_drawn_within_their_uncertainty():
@@ -740,20 +582,6 @@ def test_media_are_drawn_within_their_uncertainty():
     media = rft.mujoco.sample(fit, 4000, seed=3)
     values = [[getattr(x, name) for x in media] for name in COEFFICIENTS]
     assert_close(np.cov(values), fit.covariance, 0.1)
-    told = "a fit has its own covariance: drop spread"
-    refused(told, rft.mujoco.sample, fit, 3, spread=0.1)
-
-
-@pytest.mark.parametrize(
-    ("medium", "more", "message"),
-    [
-        ("generic", {}, "the uncertainty of the medium is unknown: give spread"),
-        ("sand", {"spread": 0.1}, "the medium has no strength to draw"),
-        ("generic", {"spread": -1.0}, "spread must be"),
-    ],
-)
-def test_media_without_an_uncertainty_are_refused(medium, more, message):
-    refused(message, rft.mujoco.sample, medium, 3, **more)
 
 
 # What is in the sand, and what touches the floor
@@ -776,8 +604,6 @@ def test_what_can_touch_nothing_is_not_in_the_sand():
     ):
         with rft.mujoco.attach(model, MAP, geoms=geoms) as sand:
             assert sand.geoms == expected
-    notes = " ".join(sand.notes)
-    assert "overlap, where the sand acts on both: 'calf' and 'foot'" in notes
 
 
 FLOORED = """<geom name="floor" type="plane" size="1 1 1" {}/>
@@ -830,27 +656,7 @@ def test_sands_of_one_model_come_and_go_in_any_order():
     assert touching(model) == {("rock", "stone"), ("floor", "foot")}
     for _ in range(2):
         second.detach()
-    assert touching(model) == before and "detached" in repr(second)
-    with rft.mujoco.attach(model, MAP, geoms="foot"):
-        model.geom_contype[:] = 1  # as users may
-    assert (model.geom_contype == 1).all()
-
-
-CLOTH = """<flexcomp name="cloth" type="grid" count="3 3 1" spacing=".05 .05 .05"
-mass=".1" radius=".01" pos="2 0 .005"><contact contype="2" conaffinity="2"/>
-</flexcomp>"""
-PAIRS = """<contact><pair geom1="floor" geom2="stone"/>
-<pair geom1="rock" geom2="foot"/></contact>"""
-
-
-def test_what_is_not_in_the_sand_touches_the_floor_as_before():
-    """Cloth, and geoms named in a <pair>, which hold all the same."""
-    world = FLOORED.format('contype="3" conaffinity="3"') + CLOTH
-    model = model_of(world, more=PAIRS)
-    before = touching(model)
-    assert ("floor",) in before  # the cloth
-    with rft.mujoco.attach(model, MAP, geoms="foot"):
-        assert touching(model) == before - {("floor", "foot")}
+    assert touching(model) == before
 
 
 FLOORS = """<geom name="second" type="plane" size="1 1 1" pos="0 0 9e-4"
@@ -860,15 +666,8 @@ euler=".05 0 0"/>
 
 
 def test_floors_at_the_surface_are_no_longer_touched_and_others_are():
-    """A note tells which; taken for an error, it leaves the model as it was."""
     model = model_of(FLOORED.format("") + FLOORS)
     before = touching(model)
-    told = "the geom no longer touches the floor 'floor' and 'second', which lies"
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        with pytest.raises(Note, match=told):
-            rft.mujoco.attach(model, MAP, geoms="foot")
-    assert touching(model) == before
     with rft.mujoco.attach(model, MAP, geoms="foot"):
         gone = {("floor", "foot"), ("foot", "second")}
         assert touching(model) == before - gone
@@ -877,48 +676,28 @@ def test_floors_at_the_surface_are_no_longer_touched_and_others_are():
 # Lives of sands
 
 
-def test_several_models_sands_and_threads_go_as_each_alone():
-    """To the last digit; a copy of a model has no sand."""
+def test_several_models_and_threads_go_as_each_alone():
+    """To the last digit."""
     models = [model_of(BALL.replace("0.03", size)) for size in ("0.03", "0.04")]
-    other = BALL.replace("ball", "other").replace("0 0 0.01", "1 0 0.01")
-    both = model_of(BALL + other)
     alone = []
     for model, law in zip(models, (SPATIAL, MAP)):
         with rft.mujoco.attach(model, law, rounding=0.02):
             alone.append(rolled(model, 300, 0.3))
-    ball, heavy = ((law, "ball") for law in (SPATIAL, MAP))
     with contextlib.ExitStack() as stack:
-        for model, (law, geoms) in zip(
-            (*models, both, both), (ball, heavy, ball, (MAP, "other"))
-        ):
-            sand = rft.mujoco.attach(model, law, geoms=geoms, rounding=0.02)
-            stack.enter_context(sand)
+        for model, law in zip(models, (SPATIAL, MAP)):
+            stack.enter_context(rft.mujoco.attach(model, law, rounding=0.02))
         with ThreadPoolExecutor(4) as pool:
             ends = [*pool.map(rolled, models * 2, [300] * 4, [0.3] * 4)]
-        two = rolled(both, 300, 0.3)
-        assert rolled(copy.copy(both), 300)[2] < -1.0
     np.testing.assert_array_equal(ends, alone * 2)
-    np.testing.assert_allclose(two[:7], alone[0], atol=1e-9)
-    assert abs(two[9] - two[2]) > 1e-4
 
 
 def test_a_callback_does_not_outlive_its_model():
-    first = model_of(BALL)
-    second = model_of(BALL)
-    one = rft.mujoco.attach(first, MAP)
-    assert one.is_attached
-    del first
+    model = model_of(BALL)
+    sand = rft.mujoco.attach(model, MAP)
+    assert sand.is_attached
+    del model
     gc.collect()
-    assert mujoco.get_mjcb_passive() is None and not one.is_attached
-    with rft.mujoco.attach(second, MAP) as other:  # in its place in the table
-        one.detach()
-        assert other.is_attached
-
-
-def test_without_numba_a_line_says_how_much_slower_it_is():
-    told = r"by Python's callback, some \d+ times slower: pip install"
-    with preferring("numpy"), pytest.warns(Note, match=told):
-        rft.mujoco.attach(model_of(BALL), MAP).detach()
+    assert mujoco.get_mjcb_passive() is None and not sand.is_attached
 
 
 # Refusals
@@ -932,32 +711,20 @@ REFUSED = [
     ({"geoms": "bal"}, "the model has no geom 'bal': did you mean 'ball'"),
     ({"geoms": ["ball", "leg*"]}, "the model has no geom 'leg"),
     ({"geoms": 5}, r"no geom is in group 5: groups are \[0\]"),
-    ({"geoms": []}, "geoms names none"),
-    ({"geoms": 1.5}, "must be|not iterable"),
     ({"geoms": "slab"}, "the geom 'slab' is a plane and has no inside: give a sphere"),
     ({"geoms": "post"}, "the geom 'post' is fixed to the world: name geoms that move"),
     ({"medium": "poppy-seeds-lose"}, "no medium 'poppy-seeds-lose': did you mean"),
     ({"medium": "glass-0.3mm-loose"}, "has no vertical law: take one of generic"),
     ({"medium": rft.Granular(1.8, 0.2)}, "no vertical law in three dimensions"),
     ({"medium": DRAGS}, "must be a StressMap, nine .* fit some to plate drags"),
-    ({"element": 0}, "element must be a number from 1e-06 to 1000 m, got 0"),
-    ({"rounding": 0}, "rounding must be a number from 1e-07 to 10 m/s, got 0"),
-    ({"level": 2e6}, r"level must be a number from -1e\+06 to 1e\+06 m"),
     ({"level": math.nan}, "level must be"),
     ({"level": "ball"}, "the geom 'ball' is a sphere"),
     ({"slope": 1.2}, "slides by itself"),
-    ({"hulls": "no"}, "hulls must be True or False, got 'no'"),
-    ({"effects": None}, "effects must be a list of effects .* got None"),
-    ({"effects": ["aeration"]}, "effects must be a list of effects"),
     ({"regions": ["x > 1"]}, "regions must be media by their conditions"),
     ({"regions": {"x > z": MAP}}, "no condition on x and y: write it like 'x > 0.5'"),
-    ({"regions": {"x * y > 1": MAP}}, "is no condition"),
     ({"regions": {"x > 1 or y > 1": MAP}}, "is no condition"),
-    ({"regions": {"1 > 0": MAP}}, "is no condition"),
     ({"regions": {"x / 0 > 1": MAP}}, "is no condition"),
-    ({"regions": {"x = 1": MAP}}, "is no condition"),
     ({"regions": {"x > " + 3000 * "-" + "1": MAP}}, "is no condition"),
-    ({"regions": {"x > 1" + 400 * "0": MAP}}, "is no condition"),
     ({"regions": {" < ".join("1x" * 51): MAP}}, "101 boundaries, more than 100"),
     ({"regions": {"x > 1": SPATIAL}}, "media of all regions must have one form"),
     ({"regions": {"x > 1": "poppy-seeds-lose"}}, "did you mean poppy-seeds-loose"),
@@ -1022,37 +789,14 @@ def test_what_changes_after_attach_is_refused():
     sand = rft.mujoco.attach(model, MAP)
     refused("a Sand cannot be pickled or copied", pickle.dumps, sand)
     refused("attached to 'ball' already: detach it", rft.mujoco.attach, model, MAP)
-    refused("the model has no body 'zz'", sand.wrench, data, "zz")
     refused("the data are of another model", sand.forces, stranger)
-    refused("the ground remembers nothing: give", sand.ground, data)
     model.geom_size[0, 0] = 0.05
     refused("'ball' changed after attach: detach the sand", sand.power, data)
-    mujoco.set_mjcb_passive(None)
-    refused("another passive callback took the place", sand.power, data)
     sand.detach()
     refused("the sand is detached", sand.forces, data)
-    refused("the sand is detached", sand.batch, 2)
     mujoco.set_mjcb_passive(lambda *_: None)
     refused("another passive callback is installed", rft.mujoco.attach, model, MAP)
     mujoco.set_mjcb_passive(None)
-
-
-@needs_numba
-def test_one_sand_of_a_model_remembers_and_its_size_is_checked():
-    both = model_of(BALL + BALL.replace("ball", "other"), '<size nuserdata="9000"/>')
-    with rft.mujoco.attach(both, MAP, geoms="ball", **PRINTS) as sand:
-        told = "another .* remembers: attach all geoms"
-        refused(told, rft.mujoco.attach, both, MAP, geoms="other", **PRINTS)
-        refused("userdata, 8015 numbers or more", sand.ground, np.zeros(5))
-
-
-def test_footprints_are_limited_and_need_numba():
-    footprints = rft.mujoco.Footprints
-    refused("have 16000000 cells, more than 1000000", footprints, 0.001, 4, 4)
-    refused("spacing must be", footprints, 0.0, 4, 4)
-    told = r"footprints need compiled code: pip install 'geomech\[fast\]'"
-    with preferring("numpy"):
-        refused(told, rft.mujoco.attach, model_of(BALL), MAP, **PRINTS)
 
 
 @pytest.mark.parametrize(

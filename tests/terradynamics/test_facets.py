@@ -15,7 +15,6 @@ from rft.terradynamics.meshes.forces.blocks import Blocks
 from rft.terradynamics.meshes.forces.contact import Motion, faces
 from rft.terradynamics.meshes.forces.extruded import Extruded
 from rft.terradynamics.meshes.forces.submerged import submerged_part
-from rft.terradynamics.meshes.surfaces import shapes
 from rft.terradynamics.plates import CLeg, Polygon, RoundRod, StressMap
 from rft.terradynamics.walking.planar.elements import Elements, Outlines
 from rft.terradynamics.walking.spatial.facets import Grains, Surface
@@ -93,10 +92,6 @@ def test_a_stress_map_of_three_dimensions_is_the_planar_one_in_every_vertical_pl
     n, v = unit((3, 200)), unit((3, 200))
     np.testing.assert_allclose(
         Extruded(stress).traction(-n, v), Extruded(stress).traction(n, v), rtol=1e-12
-    )
-    upright, along = np.array([[0.6], [0.8], [0.0]]), np.array([[-0.8], [0.6], [0.0]])
-    np.testing.assert_allclose(
-        Extruded(stress).traction(upright, along)[:2], 0.0, atol=1e-9
     )
 
 
@@ -191,21 +186,6 @@ def test_loads_are_those_of_each_mesh_alone():
     )
 
 
-def test_a_surface_stands_where_its_mesh_does():
-    """Unless it is told another place."""
-    mesh = Cylinder(0.02, 0.05).mesh(200)
-    np.testing.assert_array_equal(
-        Surface.from_mesh(0, mesh).corners, mesh.vertices[mesh.faces]
-    )
-    outline, at = CLeg(0.03, 0.02).outline(12), np.array([0.02, -0.01, 0.015])
-    moved = (
-        Surface.from_outline(0, outline, at).corners
-        - Surface.from_outline(0, outline).corners
-    )
-    np.testing.assert_allclose(moved, np.broadcast_to(at, moved.shape), atol=1e-15)
-    assert Surface.from_outline(0, outline).corners[..., 1].max() == outline.width / 2
-
-
 @pytest.mark.parametrize(
     "shape",
     [
@@ -242,19 +222,3 @@ def test_loads_on_outlines_in_their_plane_are_those_of_the_plane(shape):
     )
     assert found[4] == pytest.approx(moment, abs=6e-5 * np.abs(force).max())
     np.testing.assert_allclose(found[[1, 3, 5]], 0.0, atol=1e-9)
-
-
-def test_what_moves_aside_is_held_back():
-    """A box that turns and drifts to its left feels a force to its right."""
-    box = [Surface.from_mesh(0, shapes.box((0.1, 0.05, 0.03), 3))]
-    for law in (SPATIAL, Extruded(SAND)):
-        for grains in (Grains(law), Grains(law, flux=500.0)):
-            at = Poses(
-                np.eye(3)[None],
-                np.array([[0, 0, -0.005]]),
-                np.array([[0, 0.4, 0]]),
-                np.zeros((1, 3)),
-            )
-            assert loads(box, grains, at)[0, 1] < -0.01
-            at = at._replace(spin=np.array([[0, 0, 3.0]]), velocity=np.zeros((1, 3)))
-            assert loads(box, grains, at)[0, 5] < -1e-4

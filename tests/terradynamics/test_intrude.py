@@ -1,5 +1,5 @@
 """Scenes of bodies that are moved through grains, flat and solid: media, files, errors,
-pictures, and what is refused."""
+and what is refused."""
 
 import dataclasses
 import math
@@ -8,15 +8,11 @@ import re
 import numpy as np
 import pytest
 from frozen import FOLDER
-from registry import GROUND_EFFECTS, OUTLINES, STRESSES
+from registry import GROUND_EFFECTS, OUTLINES
 
-from geomech import medium, plots, scenes
-from geomech.core.setting import Setting
-from geomech.questions.terradynamics.stress import Stress
+from geomech import medium, scenes
 from geomech.scenes import MeshScene
 from geomech.scenes.terradynamics.intruder import IntruderScene
-from geomech.studies.scene_tables import SceneTables
-from geomech.studies.settings import Measurements
 from geomech.studies.terradynamics.intrusion import Settings, answer, estimate
 from rft.core.refusal import Refusal
 from rft.terradynamics import meshes, plates
@@ -95,19 +91,6 @@ def test_a_scene_takes_its_medium_from_a_file(more, tension, grazing, scene_with
     assert scene_with(text, more).medium == expected
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("file = 'own.toml'", "names another file, own.toml: copy the coefficients"),
-        ("zetta = 1\n", r"s.toml: \[medium\] own.toml key: 'zetta' is unknown"),
-        ("[medium\n", "it is not TOML"),
-    ],
-)
-def test_files_that_are_no_medium_are_refused(text, said, scene_with):
-    with pytest.raises(Refusal, match=said):
-        scene_with(text)
-
-
 def test_a_medium_from_plate_drags(scene_with):
     rows = ["# measured in N/cm^3", "gamma,beta,alpha_z,alpha_x"]
     for beta in range(-75, 91, 15):
@@ -119,39 +102,9 @@ def test_a_medium_from_plate_drags(scene_with):
     angles = (math.radians(30), math.radians(-45))
     expected = 0.5 * np.array(StressMap()(*angles))
     np.testing.assert_allclose(scene.medium(*angles), expected, atol=1e-9)
-    assert [p.name for p in scenes.inputs(scene)] == ["s.toml", "plates.csv"]
 
 
-def test_a_medium_that_drives_a_motion_on_is_told(tmp_path):
-    lost = "A00 = 0.2\nA10 = 0.2\nB11 = 0.2\nB01 = -0.4\nBm11 = 0.05\nC11 = -0.1\n"
-    (tmp_path / "lost.toml").write_text(f"{lost}C01 = 0.2\nCm11 = 0\nD10 = 0.1\n")
-    (note,) = Stress(str(tmp_path / "lost.toml"), 0.0, 90.0).ask()["note"].values
-    assert "lost.toml drives motion on over" in note
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_forces_of_a_scene_are_those_of_its_body_on_its_motion(name):
-    scene = scenes.load(name)
-    assert scenes.toml(scene) == scene.text
-    if name in FLAT:
-        _, pose, twist = scene.motion.trajectory(scene.outline)
-        expected = plates.loads(scene.medium, scene.outline, pose, twist)
-    else:
-        scene = dataclasses.replace(scene, triangles=min(scene.triangles, 5000))
-        _, place, *motion, _ = scene.motion.trajectory(scene.mesh)
-        turn, *rates = motion
-        expected = meshes.wrench(scene.medium, scene.mesh, turn, place, *rates)
-    found = answer(scene)
-    axes = "xz" if name in FLAT else "xyz"
-    force = np.stack([found[f"force_{axis}"].values for axis in axes], -1)
-    np.testing.assert_allclose(force, expected.force, rtol=1e-12, atol=1e-15)
-    moment = expected.moment if name in FLAT else expected.moment[:, 1]
-    np.testing.assert_allclose(found["moment"].values, moment, rtol=1e-12, atol=1e-15)
-    largest = np.linalg.norm(force, axis=1).max()
-    assert 0 <= float(found["largest_force_error"]) < 0.4 * largest
-
-
-@pytest.mark.parametrize("elements", [50, 100, 400])
+@pytest.mark.parametrize("elements", [50, 400])
 @pytest.mark.parametrize(
     ("tension", "factor", "low", "high"), [("keep", 2, 0.9, 4), ("cut", 3, 0.8, 15)]
 )
@@ -170,45 +123,12 @@ def test_the_error_of_the_elements_is_told(name, tension, factor, low, high, ele
     moment = np.abs(found.moment - exact.moment).max()
     assert low * force <= told.force <= high * force + 1e-12
     assert (low - 0.5) * moment <= told.moment
-    assert told.count == scene.actual_count(factor * scene.count)
 
 
 def test_the_error_is_not_known_where_a_body_has_no_more_elements():
     found = answer(scenes.parse(MADE.replace("elements = 40", "elements = 2499")))
     assert np.isnan(float(found["largest_force_error"]))
-    assert int(found["finest_parts"].values) == 2500
     assert found["force_x"].error is None
-
-
-# Sizes as in the captions of Figs. 6 and 8; peaks as found first: N, degrees, N m.
-PEAKS = {
-    "c-leg": (1.0, 8.90763, -47, -0.402135),
-    "reversed-c-leg": (-1.0, 4.12917, 9, -0.167863),
-    "flat-leg": (0.0, 2.70632, -42, -0.211161),
-}
-
-
-@pytest.mark.parametrize("name", PEAKS)
-def test_legs_differ_in_peak_and_in_phase(name):
-    curvature, peak, angle, moment = PEAKS[name]
-    scene = scenes.load(name)
-    assert scene.intruder.radius == 0.038
-    assert getattr(scene.intruder, "relative_curvature", 0.0) == curvature
-    assert scene.motion.rate == pytest.approx(2 * math.pi, rel=1e-12)
-    assert scene.medium == VERTICAL["poppy-seeds-loose"].stress
-    found = scene.run()
-    highest = found.force[:, 1].argmax()
-    assert found.force[highest, 1] == pytest.approx(peak, rel=1e-4)
-    assert np.degrees(found.pose[highest, 2]) == pytest.approx(angle, abs=0.01)
-    assert found.moment.min() == pytest.approx(moment, rel=1e-4)
-    assert found.power.max() == 0.0
-
-
-@pytest.mark.parametrize("name", ["half-cylinder", "round-rod", "square-rod"])
-def test_rods_are_dragged_ahead_through_glass(name):
-    rod = scenes.load(name)
-    assert rod.medium == VERTICAL["glass-3mm"].stress
-    assert rod.motion.direction == 0.0
 
 
 OF_FILES = """[medium]
@@ -274,39 +194,6 @@ def test_what_is_written_reads_the_same(scene):
     assert scenes.parse(scenes.toml(scene)) == scene
 
 
-# The scene, what is changed in it, and what the refusal names.
-REFUSED = [
-    (MADE, "[intruder]", "[motion.x]", "the table [intruder] is missing: add it"),
-    (MADE, "zeta = 0.5", 'zeta = "a"', "[medium] Expected `float`, got `str`"),
-    (MADE, "zeta = 0.5", "zetta = 0.5", "[medium] key: 'zetta' is unknown"),
-    (MADE, "zeta = 0.5", 'file = "no.csv"', "keep one of 'name', 'file'"),
-    (MADE, 'name = "poppy-seeds-close"', "A00 = 0.1", "has no A10, B01, B11"),
-    (MADE, 'kind = "polygon"', "", "[intruder] has no 'kind': add kind = one of"),
-    (MADE, 'kind = "polygon"', 'kind = "cyllinder"', "did you mean 'cylinder'"),
-    (MADE, "width = 0.03", "width = 0.03\nfile = 'b'", "either 'file' or 'points'"),
-    (MADE, "direction_deg = 30", "direction_deg = 3\ndirection = 1", "given twice"),
-    (MADE, "depth = 0.01", "depth = nan", "depth must be a number"),
-    (MADE, "samples = 7", "samples = 7\nrate = 3", "[motion] key: 'rate' is unknown"),
-    (MADE, "[motion]", "[x]\n[motion]", "table: 'x' is unknown"),
-    (BALL, "density = 1500", "xi_n = 3e5", "give 'xi_n' (N/m^3), or"),
-    (BALL, 'shape = "sphere"', "", "has no 'shape': add shape = one of sphere"),
-    (BALL, 'kind = "mesh"', 'kind = "sphere"', "'shape' is unknown: use one of"),
-    (BALL, "[10, 0, 20]", "[10, 0]", "an angle about y or a rotation vector"),
-    (BALL, 'kind = "drag"', 'kind = "rotate"', "[motion] key: 'depth' is unknown"),
-    (BALL, 'kind = "slope"', 'kind = "hill"', "[[effects]] kind: 'hill' is unknown"),
-]
-
-
-@pytest.mark.parametrize(
-    ("text", "old", "new", "said"), REFUSED, ids=[said for *_, said in REFUSED]
-)
-def test_scenes_that_make_no_sense_are_refused(text, old, new, said):
-    assert old in text
-    with pytest.raises(Refusal, match=f"made.*{re.escape(said)}") as caught:
-        scenes.parse(text.replace(old, new), "made")
-    assert "\n" not in str(caught.value)
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -329,79 +216,17 @@ def test_bad_paths_are_refused_with_their_line(text, said, tmp_path):
         scenes.load(file)
 
 
-C_LEG = scenes.load("c-leg")
-SPHERE = scenes.load("sphere")
-OWN_TABLE = dataclasses.replace(C_LEG, medium=STRESSES["measured"], text="")
-WRONG = [
-    (lambda: dataclasses.replace(C_LEG, medium=3), "a stress map such as"),
-    (lambda: dataclasses.replace(C_LEG, intruder=3), "a body such as"),
-    (lambda: dataclasses.replace(C_LEG, motion=3), "a motion such as"),
-    (lambda: dataclasses.replace(SPHERE, medium=C_LEG.medium), "a medium such as"),
-    (lambda: dataclasses.replace(SPHERE, intruder=3), "a solid such as"),
-    (lambda: dataclasses.replace(SPHERE, motion=C_LEG.motion), "rft.terradynamics.mes"),
-    (lambda: SceneTables(C_LEG), "a study is that of a Scene, got IntruderScene"),
-    (lambda: scenes.toml(OWN_TABLE), "has a CSV file of its own"),
-]
-
-
-@pytest.mark.parametrize(("build", "said"), WRONG, ids=[said for _, said in WRONG])
-def test_parts_of_another_kind_are_refused(build, said):
-    with pytest.raises(ValueError, match=said):
-        build()
-
-
-def test_a_tolerance_that_is_just_met_is_met():
-    """By the fewest elements, in force and moment."""
-    errors = {"force_error": [[5e-2, 2e-3]], "moment_error": [[1e-1, 1e-3]]}
-    measured = Measurements(
-        [Setting("elements", (8, 16), 2)],
-        np.array([[8.0, 16.0]]),
-        np.array([[1.0, 2.0]]),
-        {name: np.array(values) for name, values in errors.items()},
-    )
-    found = {v.name: v.values for v in Settings(C_LEG).choices(measured)}
-    np.testing.assert_array_equal(found["best_value"][:3], [8, 16, np.nan])
-    np.testing.assert_array_equal(found["best_error"][:3], [1e-1, 2e-3, np.nan])
-
-
 def test_errors_of_an_accuracy_study_are_rms_over_the_largest():
-    """Against the finest parts of the scene's ladder, and of the order declared."""
+    """Against the finest parts of the scene's ladder."""
     scene = scenes.parse(MADE)
     question = Settings(scene)
     (setting,) = question.settings()
-    coarse, fine = setting.values[1:3]
     truth = question.evaluate(setting, None)
-    errors = []
-    for value in (coarse, fine):
-        numbers = question.evaluate(setting, value)
-        errors.append(question.errors(numbers, truth)["moment_error"])
+    numbers = question.evaluate(setting, setting.values[1])
+    found = question.errors(numbers, truth)["moment_error"]
     off = scene.run(scene.ladder[1]).moment - scene.run(scene.ladder[-1]).moment
     expected = np.sqrt(np.mean(off**2)) / np.abs(truth[1]).max()
-    assert errors[0] == pytest.approx(expected, rel=1e-9)
-    assert setting.order == 2
-    order = np.log(errors[0] / errors[1]) / np.log(fine / coarse)
-    assert order == pytest.approx(2, abs=0.4)
-
-
-@pytest.mark.parametrize(("force", "scale"), [(4.0, 4.0 * C_LEG.size), (0.0, 1.0)])
-def test_a_moment_of_roundoff_has_its_error_over_the_force_times_the_size(force, scale):
-    """And where there is no force, either, an error is a moment."""
-    truth = [np.array([[force, 0.0]]), np.array([1e-15 * force])]
-    found = Settings(C_LEG).errors([truth[0], truth[1] + 0.02], truth)
-    assert found["force_error"] == 0.0
-    assert found["moment_error"] == pytest.approx(0.02 / scale)
-
-
-def test_pictures_show_what_was_computed():
-    found = C_LEG.run()
-    bodies, forces, moment = plots.intrusion_figure(C_LEG, answer(C_LEG)).axes
-    angle = found.pose[0, 2]
-    tip = -0.076 * np.array([math.sin(angle), math.cos(angle)]) + [0, 0.02]
-    ends = bodies.lines[0].get_xydata()[[0, -1]]
-    np.testing.assert_allclose(ends, [(0, 0.02), tip], atol=1e-12)
-    curves = [line.get_ydata() for line in (*forces.lines[:2], moment.lines[0])]
-    np.testing.assert_array_equal(curves, [*found.force.T, found.moment])
-    assert forces.get_xlabel() == "angle (degrees)"
+    assert found == pytest.approx(expected, rel=1e-9)
 
 
 VALUES = [
@@ -431,7 +256,7 @@ def changed(text, rng):
     return "\n".join(lines)
 
 
-COARSE = "\n[numerics]\ntriangles = 100\n"
+COARSE = "\n[numerics]\ntriangles = 30\n"
 TEXTS = {
     "flat": [MADE, *(scenes.load(name).text for name in FLAT)],
     "solid": [BALL, *(scenes.load(name).text + COARSE for name in SOLID)],

@@ -1,16 +1,15 @@
-"""Three-dimensional resistive force theory on meshes, against limits of the law, closed
+"""Three-dimensional resistive force theory on meshes, against the published law, closed
 forms and finer meshes."""
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rft.terradynamics.meshes import Mesh, Screw, Spatial, Sphere, bearing, read, wrench
+from rft.terradynamics.meshes import Mesh, Spatial, Sphere, bearing, wrench
 from rft.terradynamics.meshes.forces import law
 from rft.terradynamics.meshes.surfaces import shapes
-from rft.terradynamics.meshes.surfaces.mesh import below, quartered_mesh
+from rft.terradynamics.meshes.surfaces.mesh import quartered_mesh
 from rft.terradynamics.meshes.surfaces.smooth import smooth
-from rft.terradynamics.plates import VERTICAL
 
 pytestmark = pytest.mark.usefixtures("fastest")
 
@@ -77,7 +76,6 @@ def test_stress_turns_about_the_vertical_and_is_mirrored(tension):
         assert found == pytest.approx(stress @ moved.T, abs=1e-13)
     # It is independent of speed.
     assert medium.stress(n, 7.0 * v) == pytest.approx(stress, abs=1e-13)
-    assert not medium.stress(n, 0 * v).any()
 
 
 def test_stress_grows_over_the_grazing_angle():
@@ -92,15 +90,6 @@ def test_stress_grows_over_the_grazing_angle():
     share = np.clip(np.sin(angle) / np.sin(np.radians(4.0)), 0, 1)
     assert soft == pytest.approx(sharp * share**2 * (3 - 2 * share), abs=1e-15)
     assert np.abs(soft[2]).max() < 1e-9 < 1e-3 < np.abs(sharp[2]).max()
-
-
-def test_vertical_faces_do_not_depend_on_rounding():
-    turn = np.linspace(0, 6, 30)[:, None]
-    rounding = np.array([0.0, 1e-16, -1e-16])
-    n = np.stack(np.broadcast_arrays(np.cos(turn), np.sin(turn), rounding), -1)
-    stress = MEDIUM.stress(n, np.array([0.6, 0.3, -0.2]))
-    assert np.abs(stress).max() > 1e4
-    assert np.ptp(stress, axis=1).max() < 1e-8 * np.abs(stress).max()
 
 
 def test_faces_that_are_pulled_keep_push_or_lose_the_stress():
@@ -121,41 +110,9 @@ def test_faces_that_are_pulled_keep_push_or_lose_the_stress():
     assert across["cut"] == pytest.approx(np.where(pulled, 0.0, kept))
 
 
-@pytest.mark.parametrize(
-    ("stress", "most", "share"),
-    [
-        (law.alpha, 8e-4, 1.1e-4),
-        (Spatial(1.0, 0.4, "keep").stress, 8e-4, 1.1e-4),
-        (Spatial(1.0, 0.4).stress, 4e-4, 1e-5),
-        (Spatial(1.0, 0.2).stress, 4e-4, 0.0),
-    ],
-    ids=["as fitted", "keep", "cut", "less friction"],
-)
-def test_where_the_law_drives_it_says_so(stress, most, share):
-    """Nowhere but in the two regions that the docstring tells of."""
-    n = directions(400_000)
-    v = directions(400_000)
-    n *= np.where((n * v).sum(-1) < 0, -1, 1)[:, None]
-    power = (stress(n, v) * v).sum(-1)
-    tilt = np.degrees(np.arccos(n[:, 2]))
-    up = np.degrees(np.arcsin(v[:, 2]))
-    drives = power > 1e-12
-    level = drives & (tilt < 10)
-    assert level.mean() < 6e-4
-    assert power[level].max() < 0.0053
-    assert 0 < up[level].min() < up[level].max() < 20
-    tilted = drives & ~level
-    assert tilted.mean() == pytest.approx(share, abs=5e-5)
-    assert power[tilted].max(initial=0.0) < most
-    against = (n[:, :2] * v[:, :2]).sum(-1) < 0
-    region = (tilt > 56) & (tilt < 64.5) & (up > 63.5) & (up < 72) & against
-    assert region[tilted].all()
-
-
 def test_strength_from_density_and_friction():
     strength = 3000 * 9.81 * (894 * 0.064 - 386 * 0.16 + 89 * 0.4)
     assert Spatial.from_grains(3000.0, 0.4).xi_n == pytest.approx(strength)
-    assert Spatial.from_grains(1500.0, 0.7, tension="keep").tension == "keep"
 
 
 TURN = Rotation.random(random_state=11).as_matrix()
@@ -171,18 +128,11 @@ def test_force_and_moment_are_the_sum_over_faces():
     # Without spin the stress per depth is even over every face.
     pose = (TURN, PLACE, VELOCITY, STILL)
     found = wrench(MEDIUM, mesh, *pose)
-    coarse, exact = (bearing(MEDIUM, one, *pose) for one in (mesh, fine))
+    exact = bearing(MEDIUM, fine, *pose)
     assert found.force == pytest.approx(exact.force.sum(0), rel=1e-12)
     assert found.power == pytest.approx((exact.force @ VELOCITY).sum())
-    moments = [
-        np.cross(one.middle - PLACE, one.force).sum(0) for one in (coarse, exact)
-    ]
-    assert found.moment == pytest.approx(moments[1], rel=5e-3)
-    off = np.abs(np.array([found.moment, moments[0]]) - moments[1]).max(1)
-    assert off[0] < 0.03 * off[1]
-    spinning = wrench(MEDIUM, mesh, TURN, PLACE, VELOCITY, SPIN)
-    power = spinning.force @ VELOCITY + spinning.moment @ SPIN
-    assert spinning.power == pytest.approx(power)
+    moment = np.cross(exact.middle - PLACE, exact.force).sum(0)
+    assert found.moment == pytest.approx(moment, rel=5e-3)
 
 
 def test_turned_poses_turn_the_wrench_and_batches_agree():
@@ -194,10 +144,6 @@ def test_turned_poses_turn_the_wrench_and_batches_agree():
     assert turned.force == pytest.approx(yaw @ one.force, rel=1e-9)
     assert turned.moment == pytest.approx(yaw @ one.moment, rel=1e-9)
     assert turned.power == pytest.approx(np.full(6, one.power), rel=1e-9)
-    assert turned.area == pytest.approx(np.full(6, one.area), rel=1e-9)
-    turns = (yaw @ TURN).reshape(2, 3, 3, 3)
-    shaped = wrench(MEDIUM, mesh, turns, PLACE, VELOCITY, SPIN)
-    assert (shaped.force.shape, shaped.power.shape) == ((2, 3, 3), (2, 3))
 
 
 def refined(what, k):
@@ -219,22 +165,6 @@ def test_drag_converges_with_the_mesh(what, depth, velocity):
     errors = np.linalg.norm(forces - truth, axis=1) / np.linalg.norm(truth)
     assert errors[-1] < 1e-2
     assert np.log2(errors[0] / errors[-1]) / 2 > 1.6
-
-
-def test_triangles_are_cut_at_the_surface():
-    def areas(triangles):
-        return np.cross(*np.diff(triangles, axis=1).swapaxes(0, 1)) / 2
-
-    corners = RNG.normal(size=(300, 3, 3))
-    parts, origin = below(corners, corners[..., 2])
-    assert parts[..., 2].max() < 1e-15
-    total = np.zeros((300, 3))
-    np.add.at(total, origin, areas(parts))
-    # What is above, mirrored.
-    others, other_origin = below(corners * [1, 1, -1], -corners[..., 2])
-    np.add.at(total, other_origin, areas(others) * [-1, -1, 1])
-    assert total == pytest.approx(areas(corners), abs=1e-13)
-    assert set(np.bincount(origin, minlength=300)) == {0, 1, 2}
 
 
 SQUARE = np.array([(0, -1, -1), (0, 1, -1), (0, 1, 1), (0, -1, 1)]) * 0.02
@@ -286,22 +216,6 @@ def test_shapes_have_their_volume(mesh, volume):
     assert mesh.areas @ mesh.normals == pytest.approx(np.zeros(3), abs=1e-15)
 
 
-@pytest.mark.parametrize(("curvature", "side"), [(1.0, 1), (-1.0, -1)])
-def test_legs_bend_the_way_they_say(curvature, side):
-    vertices = shapes.leg(0.019, curvature, 0.003, 0.01).vertices
-    assert (side * vertices[:, 0]).max() == pytest.approx(0.019 + 0.0015)
-    ends = vertices[np.abs(vertices[:, 0]) < 1e-9, 2]
-    assert {0.0, -0.038} <= set(np.round(ends, 6) + 0.0)
-
-
-def test_a_screw_that_turns_is_driven_along_its_axis():
-    """A right-handed thread that turns about +x is driven to +x."""
-    mesh = shapes.screw(0.03, 0.015, 0.06, 0.12, 48, 96, 3)
-    ahead, back = (force(mesh, spin=[rate, 0, 0])[0] for rate in (5.0, -5.0))
-    assert ahead > 1.0
-    assert ahead == pytest.approx(-back, rel=1e-3)  # as the mesh is
-
-
 CUBE = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * 0.01
 SIDES = np.array([
     (0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7),
@@ -309,6 +223,8 @@ SIDES = np.array([
 ])  # fmt: skip
 TURNED = np.concatenate([SIDES[:-1], SIDES[-1:, ::-1]])
 DOUBLED = np.concatenate([SIDES, SIDES[:1]])
+WITHIN = np.concatenate([CUBE, CUBE / 2 + 0.002])
+HOLLOW = np.concatenate([SIDES, SIDES[:, ::-1] + len(CUBE)])
 LINE = np.concatenate([SIDES[:-1], [(1, 1, 3)]])
 BALL = shapes.sphere(0.02, 1)
 REFUSED = [
@@ -316,37 +232,17 @@ REFUSED = [
     (lambda: Mesh(CUBE, SIDES[:, ::-1]), "inside out: its normals point inwards"),
     (lambda: Mesh(CUBE, TURNED), "run along the same way"),
     (lambda: Mesh(CUBE, DOUBLED), "doubles"),
+    (lambda: Mesh(WITHIN, HOLLOW), "lies inside"),
     (lambda: Mesh(CUBE, LINE), "no area"),
     (lambda: Mesh(CUBE * np.nan, SIDES), "finite"),
     (lambda: Mesh(CUBE[:-1], SIDES), "names vertex 7"),
-    (lambda: Mesh(CUBE[:, :2], SIDES), r"\(V, 3\)"),
-    (lambda: Mesh(CUBE, SIDES[:, :2]), r"\(F, 3\)"),
-    (lambda: Mesh(CUBE, SIDES[:0]), "1 to"),
-    (lambda: Mesh(CUBE, SIDES.astype(float)), "whole numbers"),
-    (lambda: Mesh("mesh", SIDES), "real numbers"),
-    (
-        lambda: Mesh(CUBE, SIDES, smooth_normals=np.zeros((3, 3))),
-        "must be unit normals",
-    ),
-    (lambda: Mesh(CUBE, SIDES, closed=1), "closed must be true or false, got 1$"),
     (
         lambda: wrench(MEDIUM, BALL, 2 * UPRIGHT, STILL, STILL, STILL),
         "rotation matrices",
     ),
     (lambda: wrench(MEDIUM, BALL, -UPRIGHT, STILL, STILL, STILL), "rotation matrices"),
-    (lambda: wrench(MEDIUM, BALL, UPRIGHT, [0, 0], STILL, STILL), "place"),
-    (lambda: wrench(MEDIUM, BALL, UPRIGHT, STILL, STILL * np.nan, STILL), "velocity"),
-    (lambda: wrench(MEDIUM, BALL, UPRIGHT, STILL, STILL, "fast"), "spin"),
-    (lambda: Spatial(-1.0), "xi_n"),
-    (lambda: Spatial(1e6, tension="pull"), "tension"),
-    (lambda: Spatial(1e6, surface_friction=-0.1), "surface_friction"),
     (lambda: Spatial.from_grains(3000, 30.0), "friction"),
-    (lambda: shapes.sphere(0.0), "radius"),
-    (lambda: shapes.sphere(1.0, 9), "fineness"),
-    (lambda: shapes.screw(0.01, 0.02, 0.05, 0.1), "core"),
-    (lambda: shapes.leg(0.02, 1.5, 0.002, 0.01), "curvature"),
     (lambda: shapes.leg(0.02, 1.0, 0.03, 0.01), "thickness"),
-    (lambda: shapes.cylinder(0.01, 0.1, around=2), "around"),
 ]
 
 
@@ -355,26 +251,6 @@ def test_what_makes_no_sense_is_refused(build, said):
     with pytest.raises(ValueError, match=said) as told:
         build()
     assert "\n" not in str(told.value)
-
-
-@pytest.mark.parametrize("ending", ["stl", "obj", "ply"])
-def test_meshes_are_read(ending, tmp_path):
-    trimesh = pytest.importorskip("trimesh")
-    mesh = shapes.leg(0.02, 0.7, 0.004, 0.01, 6, 2, 1)
-    path = tmp_path / f"leg.{ending}"
-    trimesh.Trimesh(mesh.vertices * 1000, mesh.faces, process=False).export(path)
-    found = read(path, scale=0.001)
-    assert found.volume == pytest.approx(mesh.volume, rel=1e-5)
-    assert len(found.faces) == len(mesh.faces)
-
-
-@pytest.mark.parametrize("mesh", [BALL, shapes.leg(0.02, 1.0, 0.002, 0.01, 8, 1, 1)])
-def test_a_body_that_moves_at_random_hardly_ever_drives(mesh):
-    turn = Rotation.random(500, random_state=5).as_matrix()
-    place = RNG.uniform([-0.1, -0.1, -0.1], [0.1, 0.1, 0.02], (500, 3))
-    velocity = RNG.normal(size=(500, 3))
-    spin = 30.0 * RNG.normal(size=(500, 3))
-    assert wrench(MEDIUM, mesh, turn, place, velocity, spin).power.max() <= 0.0
 
 
 @pytest.mark.parametrize(
@@ -394,43 +270,14 @@ def test_a_round_body_that_turns_about_its_axis_bears_nothing_across():
     assert sizes[0] < 1e-2 < 2.0 < sizes[1]
 
 
-def test_a_screw_converges_as_its_surface_does():
-    """Errors would be 0.27 and 0.09 with the normals of flat triangles."""
-    body = Screw(0.03, 0.015, 0.06, 0.12)
-    meshes = [body.mesh(count) for count in (5120, 20480, 80_000)]
-    forces = [force(mesh, -0.01, [0.03, 0, 0], [6.0, 0, 0]) for mesh in meshes]
-    truth = forces.pop()
-    errors = np.linalg.norm(forces - truth, axis=1) / np.linalg.norm(truth)
-    assert errors[0] < 0.06
-    assert errors[1] < 0.025
-
-
 def test_smooth_cylinders_keep_their_edges():
-    """In quarters as in wholes, and on both sides of a sheet."""
+    """Also on both sides of a sheet."""
     mesh = smooth(shapes.cylinder(0.02, 0.06, 40, 6, 3))
     side = np.abs(mesh.normals[:, 1]) < 0.5
     outwards = mesh.middles * [1, 0, 1]
     outwards /= np.linalg.norm(outwards, axis=-1, keepdims=True)
     expected = np.where(side[:, None], outwards, mesh.normals)
     np.testing.assert_allclose(mesh.middle_normals, expected, atol=1e-4)
-    # The last quarter of each triangle is in its middle.
-    finer = quartered_mesh(mesh).middle_normals[3 * len(side) :]
-    np.testing.assert_allclose(finer, mesh.middle_normals, atol=5e-3)
     sheet = smooth(Mesh(mesh.vertices, mesh.faces[side], closed=False)).two_sided
     front, back = np.split(sheet.middle_normals, 2)
     np.testing.assert_allclose(back, -front, atol=1e-15)
-
-
-@pytest.mark.parametrize("name", ["generic", "poppy-seeds-loose", "poppy-seeds-close"])
-def test_the_trend_is_that_of_the_map_of_two_dimensions(name):
-    """Both over their stress on a plate pushed straight down."""
-    line = np.radians(np.arange(-88, 89, 4))
-    beta, gamma = np.meshgrid(line, line, indexing="ij")
-    stress = VERTICAL[name].stress
-    flat = np.stack(stress(beta, gamma)) / stress(0.0, np.pi / 2)[1]
-    solid = law.alpha_of_angles(beta, gamma, 0.0) / Spatial(1.0).plate
-    assert np.corrcoef(flat[0].ravel(), -solid[..., 0].ravel())[0, 1] > 0.79
-    assert np.corrcoef(flat[1].ravel(), solid[..., 2].ravel())[0, 1] > 0.9
-    level = np.abs(beta) < np.radians(10)
-    difference = (solid[..., 2] - flat[1])[level]
-    assert np.sqrt((difference**2).mean()) < 0.17

@@ -7,15 +7,13 @@ import pytest
 
 from geomech import scenes
 from geomech.io import rows
-from geomech.plots.terradynamics.intruders import mirrored_ahead
 from geomech.scenes.terradynamics import penetration
-from geomech.studies.terradynamics import calibration, stress_calibration
+from geomech.studies.terradynamics import calibration
 from rft.fits.plates import (
     COEFFICIENTS,
     GENERIC,
     MISTAKES,
     SPREAD,
-    STRENGTHS,
     fit_stress,
     fit_zeta,
 )
@@ -30,7 +28,6 @@ NAMED = [entry.stress for entry in VERTICAL.values()]
 AXES = np.meshgrid(np.arange(-60, 91, 30) * RAD, np.arange(-90, 91, 30) * RAD)
 GRID = [x.ravel() for x in AXES]
 STEEP = np.stack([np.arange(-75, 91, 15) * RAD, np.full(12, 90 * RAD)])
-LEVEL = np.stack([np.arange(-75, 91, 15) * RAD, np.zeros(12)])
 
 
 def coefficients(stress):
@@ -74,9 +71,6 @@ def test_exact_drags_give_their_set_back(stress):
     found = fit_stress(*GRID, *stress(*GRID))
     np.testing.assert_allclose(found.values, coefficients(stress), atol=1e-9)
     assert found.undetermined == []
-    assert found.resolution.min() > 1 - 1e-9
-    strength = coefficients(stress) @ GENERIC / (GENERIC @ GENERIC)
-    assert found.zeta == pytest.approx(strength, rel=0.3)
 
 
 def test_where_drags_determine_all_it_is_plain_least_squares():
@@ -89,7 +83,6 @@ def test_where_drags_determine_all_it_is_plain_least_squares():
     assert np.abs((found.values - plain) / found.errors).max() < 0.05
     textbook = left / (300 - 9) * np.linalg.inv(X.T @ X)
     np.testing.assert_allclose(found.covariance, textbook, rtol=0.02, atol=1e-7)
-    assert found.free == pytest.approx(291, abs=0.1)
     np.testing.assert_allclose(found.residuals.ravel(), y - X @ found.values)
     half_widths = np.diff(found.intervals)[:, 0] / 2
     student = 1.968  # 291 degrees of freedom
@@ -133,7 +126,7 @@ def test_what_is_not_determined_follows_bayes():
     assert np.abs(rows_ @ found.values - plain).max() < 0.1 * found.noise
 
 
-def test_no_matter_how_a_plate_is_turned_nor_in_which_unit():
+def test_no_matter_how_a_plate_is_turned():
     rng = np.random.default_rng(4)
     beta, gamma, a_x, a_z = noisy(LOOSE, rng, count=30)
     expected = fit_stress(beta, gamma, a_x, a_z)
@@ -144,9 +137,6 @@ def test_no_matter_how_a_plate_is_turned_nor_in_which_unit():
     np.testing.assert_allclose(turned.values, expected.values, atol=1e-9)
     residuals = np.where(mirrored, -1, 1) * expected.residuals[0]
     np.testing.assert_allclose(turned.residuals[0], residuals, atol=1e-9)
-    stronger = fit_stress(beta, gamma, 3 * a_x, 3 * a_z)
-    np.testing.assert_allclose(stronger.values, 3 * expected.values, rtol=1e-7)
-    np.testing.assert_allclose(stronger.errors, 3 * expected.errors, rtol=1e-7)
 
 
 SLIPPED = [
@@ -171,13 +161,6 @@ def test_slips_of_columns_and_signs_are_named(slip, said, stress):
         fit_stress(*slip(*drags))
 
 
-@pytest.mark.parametrize("stress", [FAR, *NAMED])
-def test_no_medium_is_taken_for_a_slip(stress):
-    """Nor with noise of a fifth of its stress."""
-    for noise in (0.0, 0.2 * stress.zeta * (stress.A00 + stress.B01)):
-        fit_stress(*noisy(stress, np.random.default_rng(6), noise))
-
-
 def penetrated(rng, noise=0.05, count=40, alike=1):
     """Return depths and forces of zeta = 0.31 on 9.5 cm^2; noise is the same for some
     neighbours."""
@@ -199,9 +182,6 @@ def test_zeta_is_the_slope_through_the_origin():
     student = 2.0227  # 39 degrees of freedom
     half_width = np.diff(found.interval)[0] / 2
     assert half_width == pytest.approx(student * found.error, rel=1e-4)
-    assert found.stress == StressMap(zeta=found.zeta)
-    line = np.polyfit(depth, force, 1)
-    assert found.zero == pytest.approx(-line[1] / line[0], rel=1e-9)
 
 
 @pytest.mark.parametrize(("alike", "fewest"), [(1, 0.92), (4, 0.85)])
@@ -225,29 +205,23 @@ def test_areas_may_differ_and_rows_above_the_surface_do_not_count():
     area = np.array([1, 1, 1, 2, 3]) * 1e-3
     found = fit_zeta(depth, [3.0, 9.0, 1.0, 4.0, 9.0], area)
     assert found.zeta == pytest.approx(0.1, rel=1e-12)
-    assert found.depth.tolist() == [0.01, 0.02, 0.03]
 
 
 DEPTHS = [0.01, 0.02, 0.03]
 FORCES = [1.0, 2.0, 3.0]
-NO_AREA = [1.0, 0.0, 1.0]
-ZERO = 0 * GRID[0]
-PASCALS = [1e6 * a for a in StressMap()(*GRID)]
 REFUSED = {
     "3 to 100000 depths below the surface": lambda: fit_zeta([-1.0] * 3, FORCES, 1.0),
     "the force is against the law": lambda: fit_zeta(DEPTHS, [-1.0] * 3, 1e-3),
     "no grains (0.01 to 100): check the units, depth": lambda: fit_zeta(
         DEPTHS, FORCES, 1e-9
     ),
-    "area of the plate must be above 0": lambda: fit_zeta(DEPTHS, FORCES, NO_AREA),
+    "area of the plate must be above 0": lambda: fit_zeta(DEPTHS, FORCES, [1, 0, 1]),
     "must be finite": lambda: fit_zeta([0.01, np.nan, 0.03], FORCES, 1e-3),
     "depth and force must be equally many": lambda: fit_zeta([0.01], FORCES, 1e-3),
     "area must be one number": lambda: fit_zeta(DEPTHS, FORCES, [1e-3] * 2),
     "equally many numbers": lambda: fit_stress([0.1], [0.1, 0.2], [1], [1]),
-    "at most 1e+12": lambda: fit_stress(*GRID, ZERO, ZERO + 1e300),
     "must be a whole number from 6": lambda: fit_stress(*[[0.1] * 5] * 4),
-    "the plate drags are all 0": lambda: fit_stress(*GRID, ZERO, ZERO + 1e-300),
-    "no grains (0.01 to 100): check the units": lambda: fit_stress(*GRID, *PASCALS),
+    "the plate drags are all 0": lambda: fit_stress(*GRID, 0 * GRID[0], 0 * GRID[0]),
 }
 
 
@@ -257,57 +231,6 @@ def test_what_makes_no_sense_is_refused_with_one_line(said):
         REFUSED[said]()
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_what_is_not_determined_is_noted(tmp_path):
-    """Level motions tell A00, A10 and D10 alone."""
-    found = calibration.answer(plates(tmp_path / "plates.csv", LEVEL))
-    missing = found["parameter"].values[found["undetermined"].values == 1]
-    assert missing.tolist() == ["B11", "B01", "B-11", "C11", "C-11"]
-    (note,) = found["note"].values
-    assert "plates.csv: these drags do not determine B11, B01" in note
-    assert "generic shape" in found.attributes["medium_toml"]
-
-
-def test_drags_are_drawn_where_the_same_plate_moves_ahead():
-    angles = np.random.default_rng(8).uniform(-360, 360, (2, 400))
-    beta, gamma, side = mirrored_ahead(*angles)
-    assert np.abs([beta, gamma]).max() <= 90
-    a_x, a_z = StressMap()(*np.radians(angles))
-    found = StressMap()(np.radians(beta), np.radians(gamma))
-    np.testing.assert_allclose(found, [side * a_x, a_z], atol=1e-12)
-
-
-def test_one_component_may_be_nothing():
-    """Straight up and down with level plates there is no drag at all."""
-    level = np.zeros(8)
-    way = np.repeat([90.0, -90.0], 4) * RAD
-    a_x, a_z = StressMap(zeta=0.5)(level, way)
-    found = fit_stress(level, way, 0 * a_x, a_z)
-    assert found.zeta == pytest.approx(0.5)
-    np.testing.assert_allclose(found.stress(0.0, np.pi / 2), (0.0, 0.5), atol=1e-6)
-
-
-def test_a_map_that_drives_motion_on_is_noted(tmp_path):
-    file = plates(tmp_path / "plates.csv", stress=StressMap(B01=-0.05))
-    (note,) = calibration.answer(file)["note"].values
-    assert "drives motion on" in note
-
-
-def test_a_plate_that_the_package_pushes_down_has_its_zeta(tmp_path):
-    """The table of an intruder scene is a penetration test: columns z and force_z."""
-    scene = scenes.parse(
-        '[medium]\nname = "glass-3mm"\n[intruder]\nkind = "plate"\nlength = 0.038\n'
-        'width = 0.025\n[motion]\nkind = "penetrate"\ndepth = 0.05\n'
-    )
-    found = scene.run()
-    table = np.column_stack([found.pose[:, 1], found.force[:, 1]])
-    file = tmp_path / "down.csv"
-    np.savetxt(file, table, delimiter=",", header="z,force_z", comments="")
-    fitted = calibration.answer(str(file), None, {"area": 9.5e-4})
-    assert fitted.attributes["law"] == "zeta"
-    assert fitted["value"].values[0] == pytest.approx(0.224, rel=1e-9)
-    assert 0 < fitted["standard_error"].values[0] < 1e-10
 
 
 @pytest.mark.parametrize(
@@ -321,8 +244,6 @@ def test_a_surface_that_is_elsewhere_is_noted(shift, noise, noted, tmp_path):
     file = written(tmp_path / "p.csv", "depth,force", *lines)
     found = calibration.answer(file, "zeta", {"area": 9.5e-4})
     assert ("note" in found) == noted
-    off = abs(float(found["zero_depth"]) - shift)
-    assert (off > 0.02 * 0.06) == (noise > 1.0)
 
 
 # A header and a row with the depth 2 and the force 3: both and the area, m, N, m^2.
@@ -360,29 +281,6 @@ def test_columns_and_areas_in_the_units_they_name(text, tmp_path):
         assert found.area[0] == pytest.approx(area)
 
 
-@pytest.mark.parametrize(
-    ("head", "law"),
-    [
-        ("depth_m,force_N", "zeta"),
-        ("z,force_z", "zeta"),
-        ("depth_inch;force", "zeta"),
-        ("psi_deg,depth,force", "granular"),
-        ("t,z", "granular"),
-        ("gamma,beta_deg", "stress-map"),
-        ("gamma,alpha_x", "stress-map"),
-        ("area,force", "granular"),
-    ],
-)
-def test_the_law_is_that_of_the_columns(head, law, tmp_path):
-    assert stress_calibration.law_of(written(tmp_path / "q.csv", head)) == law
-
-
-def test_zeta_of_the_catalogue_is_within_what_is_taken_for_grains():
-    low, high = STRENGTHS
-    down = [stress(0.0, np.pi / 2)[1] for stress in NAMED]
-    assert 20 * low <= min(down) <= max(down) <= high / 20
-
-
 def test_plate_drags_become_a_medium_that_scenes_read(tmp_path):
     fitted = calibration.answer(plates(tmp_path / "plates.csv"))
     off = np.abs(fitted["value"].values - coefficients(CLOSE))
@@ -418,14 +316,3 @@ def test_slips_of_units_are_named(said, tmp_path):
     with pytest.raises(ValueError, match="drags.csv") as caught:
         calibration.answer(file)
     assert said in str(caught.value)
-
-
-def test_the_least_known_angle_is_where_no_plate_was_dragged():
-    angles = np.array(GRID)[:, GRID[1] > 0.5]
-    found = fit_stress(*angles, *StressMap()(*angles))
-    least = design(*np.array(found.least_known())[:, None])
-    variances = np.trace(least @ found.covariance @ least.T)
-    others = [design(*np.array(pair)[:, None]) for pair in zip(*GRID)]
-    assert found.least_known()[1] < 0
-    largest = max(np.trace(X @ found.covariance @ X.T) for X in others)
-    assert variances >= largest * (1 - 1e-9)

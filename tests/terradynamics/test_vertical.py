@@ -1,5 +1,5 @@
-"""The vertical plane: the stress map against its definition and its check values, loads
-against closed forms, adaptive quadrature, mirror images and far finer computations."""
+"""The vertical plane: the stress map against its definition, loads against adaptive
+quadrature, mirror images and far finer computations."""
 
 import dataclasses
 import itertools
@@ -48,7 +48,6 @@ M0 = StressMap()
 GENERIC = (0.206, 0.169, 0.212, 0.358, 0.055, -0.124, 0.253, 0.007, 0.088)
 LOOSE = (0.051, 0.047, 0.053, 0.083, 0.020, -0.026, 0.057, 0.0, 0.025)
 CLOSE = (0.094, 0.092, 0.092, 0.151, 0.035, -0.039, 0.086, 0.018, 0.046)
-SHEETS = [name for name, shape in OUTLINES.items() if not shape.outline(60).closed]
 
 
 def by_definition(beta, gamma, coefficients=GENERIC):
@@ -67,21 +66,6 @@ def random_motions(count, seed=0):
     pose = rng.uniform([[-1], [-0.08], [-3]], [[1], [0.04], [3]], (3, count)).T
     twist = rng.normal(size=(count, 3)) * [0.05, 0.05, 1.0]
     return pose, twist * 10 ** rng.uniform(-2, 2, (count, 1))
-
-
-@pytest.mark.parametrize(
-    ("beta", "gamma", "expected"),
-    [
-        (0, 90, (0, 1)),
-        (0, -90, (0, -0.25)),
-        (90, 0, (0.37, 0.037)),
-        (0, 0, (0.136, 0.375)),
-        (45, 45, (0.3595, 0.5702)),
-    ],
-)
-def test_check_values_of_the_generic_map(beta, gamma, expected):
-    found = StressMap(zeta=0.24)(beta * RAD, gamma * RAD)
-    np.testing.assert_allclose(found, 0.24 * np.array(expected), atol=5e-5)
 
 
 @pytest.mark.parametrize(
@@ -135,16 +119,6 @@ def test_named_media_have_their_strength_and_take_power_at_all_angles(name):
     assert survey(stress).pushing == 0
 
 
-def test_the_generic_map_pulls_on_13_percent():
-    """Of faces that move forwards on those that look up by 53 degrees or more."""
-    assert survey(M0).pulling == pytest.approx(0.13, abs=0.005)
-    up = np.linspace(1, 89, 177) * RAD
-    a_x, a_z = M0.alpha((np.cos(up), np.sin(up)), (1.0, 0.0))
-    pulled = np.sin(up) * a_z - np.cos(up) * a_x > 0
-    assert up[pulled].min() / RAD == pytest.approx(53, abs=1)
-    np.testing.assert_array_equal(pulled, up >= up[pulled].min())
-
-
 def test_a_survey_finds_what_drives_a_motion_on():
     """As a map whose sign is lost in one coefficient: force times unit velocity."""
     lost = (*GENERIC[:3], -0.358, *GENERIC[4:])
@@ -178,19 +152,6 @@ def test_lift_over_drag_of_rods_at_one_depth(rod, tension, expected, grazing):
     stress = StressMap(tension=tension, grazing=grazing, zeta=0.3)
     x, z = loads(stress, rod.outline(400), (0, -1, 0), (0.2, 0, 0)).force
     assert -z / x == pytest.approx(expected, abs=0.005)
-
-
-@pytest.mark.parametrize("elements", [1, 7])
-def test_a_plate_that_crosses_the_surface_is_cut_there_exactly(elements):
-    """The integral of depth over what is below is width d^2 / (2 sin beta), d the depth
-    of the lower edge."""
-    plate = Plate(length=0.06, width=0.02, tilt=0.7).outline(elements)
-    twist = (0.1 * np.cos(0.4), -0.1 * np.sin(0.4), 0)
-    found = loads(M0, plate, (0.3, -0.004, 0), twist)
-    a_x, a_z = by_definition(0.7, 0.4)
-    lowest = 0.03 * np.sin(0.7) + 0.004
-    below = 0.02 * lowest**2 / (2 * np.sin(0.7)) * 1e6
-    np.testing.assert_allclose(found.force, (-a_x * below, a_z * below), rtol=1e-12)
 
 
 def test_a_turning_plate_against_adaptive_quadrature():
@@ -233,19 +194,6 @@ def reversed_outline(outline, signs=(1, 1)):
     return Outline(outline.points[::-1] * signs, outline.width, normals)
 
 
-@pytest.mark.parametrize("tension", ["keep", "cut"])
-@pytest.mark.parametrize("shape", SHEETS)
-def test_either_side_of_a_sheet_may_lead(shape, tension):
-    """Its points come in either order."""
-    sheet = OUTLINES[shape].outline(60)
-    stress = dataclasses.replace(STRESSES["jumping"], tension=tension)
-    motions = random_motions(200, 3)
-    there = loads(stress, reversed_outline(sheet), *motions).force
-    here = loads(stress, sheet, *motions).force
-    np.testing.assert_allclose(there, here, atol=1e-11 * np.abs(here).max())
-    assert (np.abs(here).max(-1) > 0).mean() > 0.5
-
-
 @pytest.mark.parametrize("stress", [M0, STRESSES["jumping"]])
 @pytest.mark.parametrize("shape", OUTLINES)
 def test_the_mirrored_scene_has_the_mirrored_force(shape, stress):
@@ -273,21 +221,16 @@ def test_power_is_never_positive(stress):
 
 
 @pytest.mark.parametrize("shape", OUTLINES)
-def test_the_force_depends_on_direction_alone_and_on_depth(shape):
+def test_the_force_depends_on_the_direction_of_motion_below_the_surface(shape):
     outline = OUTLINES[shape].outline(50)
     pose, twist = random_motions(50, 5)
 
     def force(pose, factor=1.0):
         return loads(STRESSES["poppy-seeds-close"], outline, pose, factor * twist).force
 
-    here = force(pose)
-    np.testing.assert_allclose(force(pose, 1e4), here, rtol=1e-9)
+    np.testing.assert_allclose(force(pose, 1e4), force(pose), rtol=1e-9)
     assert not force(pose, 0.0).any()
     assert not force(pose + [0, 1, 0]).any()
-    np.testing.assert_array_equal(force(pose + [5, 0, 0]), here)
-    deep = [force(pose * [1, 0, 1] - [0, depth, 0]) for depth in (1.0, 2.0, 3.0)]
-    size = np.abs(deep[0]).max()
-    np.testing.assert_allclose(*np.diff(deep, axis=0), atol=1e-9 * size)
 
 
 EFFECTS = [
@@ -405,8 +348,6 @@ def test_legs_of_any_curvature_have_the_same_projected_length(curvature):
     assert outline.lengths.sum() == pytest.approx(arc, rel=1e-5)
     deepest = -0.04 * curvature / (1 + np.sqrt(1 - curvature**2))
     assert outline.points[200, 0] == pytest.approx(deepest, abs=1e-15)
-    mirrored = CLeg(0.04, 0.02, -curvature).outline(400).points * [-1, 1]
-    np.testing.assert_allclose(outline.points, mirrored, atol=1e-15)
 
 
 T = np.linspace(0.0, 2.0, 4001)
@@ -433,86 +374,27 @@ def test_penetration_begins_at_the_surface_and_ends_at_its_depth(name):
     outline = OUTLINES[name].outline(300)
     motion = Penetrate(depth=0.04, attitude=0.7, direction=1.1)
     pose = motion.trajectory(outline).pose
-    x, z = outline.points.T
-    lowest = (z * np.cos(0.7) - x * np.sin(0.7)).min()
+    lowest = (outline.points @ [-np.sin(0.7), np.cos(0.7)]).min()
     np.testing.assert_allclose(pose[[0, -1], 1] + lowest, [0.0, -0.04], atol=1e-15)
 
 
-def test_measured_maps_return_what_was_measured_and_converge():
-    asked = np.random.default_rng(4).uniform(-np.pi, np.pi, (2, 400))
-    errors = []
-    for count in (7, 13, 25):
-        line = np.linspace(-90, 90, count) * RAD
-        beta, gamma = (x.ravel() for x in np.meshgrid(line, line))
-        drags = PlateDrags(beta, gamma, *M0(beta, gamma), zeta=2.0)
-        expected = 2 * np.array(M0(beta, gamma))
-        np.testing.assert_allclose(drags(beta, gamma), expected, atol=1e-9)
-        errors.append(np.abs(np.array(drags(*asked)) - 2 * np.array(M0(*asked))).max())
-    assert errors[2] < 0.03
-    assert (-np.diff(np.log2(errors)) > 1.6).all()
-
-
-def test_drags_of_plates_given_at_any_turn_are_the_same_map():
-    lines = np.arange(-75, 91, 15) * RAD, np.arange(-90, 91, 15) * RAD
-    beta, gamma = (x.ravel() for x in np.meshgrid(*lines))
+def test_measured_maps_return_what_was_measured_and_are_smooth_between():
+    """Of plates given at any turn, and mirrored."""
+    rng = np.random.default_rng(4)
+    line = np.linspace(-90, 90, 25) * RAD
+    beta, gamma = (x.ravel() for x in np.meshgrid(line, line))
+    turns = rng.integers(-3, 4, (2, beta.size)) * np.pi
     a_x, a_z = M0(beta, gamma)
-    plain = PlateDrags(beta, gamma, a_x, a_z)
-    turns = np.random.default_rng(9).integers(-3, 4, (2, beta.size)) * np.pi
-    turned = PlateDrags(beta + turns[0], gamma + 2 * turns[1], a_x, a_z)
-    mirrored = PlateDrags(-beta, np.pi - gamma, -a_x, a_z)
-    between = (beta + 1.0, gamma + 1.0)
-    for other in (turned, mirrored):
-        np.testing.assert_allclose(other(*between), plain(*between), atol=2e-2)
-        np.testing.assert_allclose(other(beta, gamma), (a_x, a_z), atol=1e-9)
-
-
-FEWEST = {
-    "plate": 1, "round-rod": 8, "half-cylinder": 5, "half-cylinder, flat up": 5,
-    "square-rod": 4, "c-leg": 1, "c-leg, reversed": 1, "flat-leg": 1, "wheel": 8,
-    "wheel, lugs": 30, "polygon": 4, "polygon, open": 2, "spline": 8, "spline, open": 8,
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", OUTLINES)
-def test_shapes_take_a_fewest_number_of_elements(name):
-    assert OUTLINES[name].outline(1).elements == FEWEST[name]
-
-
-@pytest.mark.parametrize("shape", [SquareRod(0.1, 0.1), RoundRod(0.1, 0.1)])
-def test_shapes_have_as_many_elements_as_asked_for(shape):
-    assert shape.outline(40).elements == 40
+    plain = PlateDrags(beta + turns[0], gamma + 2 * turns[1], a_x, a_z, zeta=2.0)
+    mirrored = PlateDrags(-beta, np.pi - gamma, -a_x, a_z, zeta=2.0)
+    asked = rng.uniform(-np.pi, np.pi, (2, 400))
+    for drags in (plain, mirrored):
+        np.testing.assert_allclose(drags(beta, gamma), (2 * a_x, 2 * a_z), atol=1e-9)
+        np.testing.assert_allclose(drags(*asked), 2 * np.array(M0(*asked)), atol=0.03)
 
 
 def test_every_kind_of_shape_is_in_the_registry():
     assert {type(shape) for shape in OUTLINES.values()} == set(SHAPES.values())
-
-
-@pytest.mark.parametrize(
-    ("name", "build", "largest"),
-    [
-        ("depth", Drag, 10),
-        ("depth", Penetrate, 10),
-        ("speed", lambda x: Drag(1, speed=x), 1e3),
-        ("direction", lambda x: Drag(1, direction=x), 10),
-        ("attitude", lambda x: Drag(1, attitude=-x), 10),
-        ("distance", lambda x: Drag(1, distance=x), 1e3),
-        ("hub_height", Rotate, 10),
-        ("rate", lambda x: Rotate(1, rate=x), 1e3),
-        ("start", lambda x: Rotate(1, start=-x), 1e3),
-        ("radius", lambda x: RoundRod(x, 1), 10),
-        ("width", lambda x: Plate(1, x), 10),
-        ("side", lambda x: SquareRod(x, 1), 10),
-        ("tilt", lambda x: Plate(1, 1, -x), 100),
-        ("relative_curvature", lambda x: CLeg(1, 1, -x), 1),
-        ("zeta", lambda x: StressMap(zeta=x), 1e6),
-        ("D10", lambda x: StressMap(D10=-x), 1e6),
-        ("grazing", lambda x: StressMap(grazing=x), np.pi / 4),
-    ],
-)
-def test_limits_are_allowed_and_no_more(name, build, largest):
-    build(largest)
-    with pytest.raises(ValueError, match=f"{name} must be a number from "):
-        build(largest * (1 + 1e-9))
 
 
 LINE = [0.1 * k for k in range(8)]
@@ -522,26 +404,16 @@ FLAT = OUTLINES["plate"].outline()
 # The chords between its points do not cross.
 LOOP = [(0.026, 0), (0.003, 0.029), (-0.009, 0.023), (0.021, 0.043), (-0.039, 0.023)]
 REFUSED = [
-    (lambda: StressMap(A00=np.nan), "A00 must be a number"),
     (lambda: PlateDrags(*[[0] * 5] * 4), "plate drags must be 6 to 5000, got 5"),
     (lambda: PlateDrags([0, 1], [0], [0], [0]), "must be equally many"),
     (lambda: PlateDrags(*[LINE] * 4), "no plate drag within 35 degrees of beta"),
     (lambda: Wheel(0.1, 0.1, 40, 0.01, 0.02), "lug_width must be below 0.0157 m"),
     (lambda: Wheel(0.1, 0.1, lug_height=0.01), "need lugs"),
-    (lambda: HalfCylinder(0.1, 0.1, "left"), "flat must be 'down' or 'up', got"),
-    (lambda: Polygon([(0, 0), (40, 0), (0, 40)], 0.1), "finite and within 10 m"),
     (lambda: Polygon(BOWTIE, 0.1), r"elements \[0\] and \[2\] of the outline cross"),
     (lambda: Polygon(TOUCHES, 0.1), "cross or touch"),
     (lambda: Spline(LOOP, 0.1), r"elements \[3\] and \[6\] of the outline cross"),
-    (lambda: Polygon([(0, 0), (1, 0), (1, 0)], 0.1), r"points \[1\] and the next are"),
     (lambda: Polygon([(0, 0), (1, 0), (0.5, 0)], 0.1, closed=False), "turns back onto"),
-    (lambda: Polygon([(0, 0), (1, 0)], 0.1), "takes 3 to 2000 points, got 2"),
-    (lambda: Polygon([(0, 0, 0)] * 3, 0.1), r"points must be a list of \(x, z\)"),
-    (lambda: RoundRod(0.1, 0.1).outline(0), "elements must be a whole number from 1"),
-    (lambda: Rotate(0.02, 1.0, 1.0, -1.0), "a rate from start to stop"),
     (lambda: Rotate(0.02, rate=0.0), "rate must not be 0"),
-    (lambda: Penetrate(0.1, direction=-1.0), "direction must point downwards"),
-    (lambda: Path(*[[0, 1]] * 3), "a path takes 3 to 100000 poses, got 2"),
     (lambda: Path([0, 2, 1], [0, 1, 2], [0, 1, 2]), "t must ascend, but t = 2"),
     (lambda: Path([0, 1, 2], [0, 1], [0, 1, 2]), "equally many"),
     (lambda: loads(M0, FLAT, (0, 0), (1, 0, 0)), r"pose must have shape \(..., 3\)"),

@@ -7,22 +7,16 @@ import math
 
 import numpy as np
 import pytest
-from artists import curve, drawn
-from PIL import Image, ImageSequence
+from artists import drawn
 from scipy.spatial.transform import Rotation
-from tabled import of_swept
 
-from figures.paper import fig12_walking
 from figures.robots import walking_sensitivity, walking_steps
-from figures.terradynamics import wheel as wheel_figure
+from figures.terradynamics import meshes, wheel
 from geomech import scenes
-from geomech.plots import films
 from geomech.questions.terradynamics.walk import Walk
-from geomech.studies.displacement.sweep import Plan
 from geomech.studies.terradynamics import walking
 from rft.balance.backend import preferring
 from rft.core.metres import GRAVITY
-from rft.core.refusal import Refusal
 from rft.terradynamics.ground import Aeration, GrainInertia, Slope
 from rft.terradynamics.plates import VERTICAL, CLeg, RoundRod, StressMap, Wheel, loads
 from rft.terradynamics.walking import (
@@ -42,7 +36,7 @@ from rft.terradynamics.walking.planar.stride import (
     walk_from_rest,
 )
 from rft.terradynamics.walking.planar_walk import batch_strides, rerun, walk
-from rft.terradynamics.walking.robot import intervals, walking_rounding
+from rft.terradynamics.walking.robot import walking_rounding
 
 pytestmark = pytest.mark.usefixtures("fastest")
 SAND = StressMap(zeta=0.3, grazing=math.radians(5))
@@ -83,40 +77,6 @@ def test_the_clock_turns_once_a_cycle_and_sweeps_while_it_stands(gait):
     np.testing.assert_allclose(slopes[smooth], gait.rate(phase)[smooth], rtol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("gait", "kinks"),
-    [
-        (Tripod(1.0, 0.3), (0.0, 0.15, 0.35, 0.5)),
-        (Tripod(1.0, 0.8), (0.0, 0.1, 0.4, 0.5)),
-        (Tripod(1.0, 0.5, 1.0), (0.0, 0.25, 0.5)),
-        (Tripod(1.0, 0.3, 0.6 * np.pi), (0.0, 0.5)),
-    ],
-)
-def test_each_kink_of_the_clock_stands_once(gait, kinks):
-    """Also where legs of both tripods change their rates, or none does."""
-    assert gait.kinks == pytest.approx(kinks)
-
-
-def test_a_belly_that_sinks_slowly_bears_less():
-    """Less by its speed over the rounding, and by that across its bottom."""
-    high = dataclasses.replace(ROBOT, hip_height=0.5)
-    stress = dataclasses.replace(SAND, grazing=math.radians(30))
-    robots = batch_strides([Walker(high, Tripod(1.0), stress)], QUICK).robots
-    sink = 4e-3
-    pose = np.array([0.0, 0.01, 0.0])
-    twist = np.array([0.0, -sink, 0.0])
-    motion = robots.leg_motion(np.zeros(1), 0.0)
-    a = robots.accelerations(pose[None, None], twist[None, None], *motion)[0][0, 0]
-    sharp = dataclasses.replace(stress, grazing=0.0)
-    full = loads(sharp, high.belly(8), pose, twist).force
-    rounded = math.hypot(sink, 3e-3)
-    share = sink / rounded * sink / math.hypot(sink, 0.5 * rounded)
-    assert share < 0.7
-    assert full[1] > 1.0
-    found = high.mass * (a[:2] + [0, GRAVITY])
-    np.testing.assert_allclose(found, share * full, rtol=1e-9, atol=1e-9)
-
-
 def fall(steps, time=0.12):
     """Return Xplorer at 4 Hz at rest, after a while, and its equations."""
     robots = batch_strides([xplorer(frequency=4.0)], QUICK).robots
@@ -143,22 +103,6 @@ def test_steps_are_of_order_two_and_energy_is_kept_to_that():
     assert max(errors[-1]) < 2e-3
 
 
-def test_what_falls_free_falls_as_galilei_says():
-    robots = batch_strides([Walker(ROBOT, Tripod(2.0), SAND)], QUICK).robots
-    state = robots.start()
-    start = state.pose[0] + [0, 5.0, 0]
-    state = state._replace(pose=start[None], twist=np.array([[0.3, 1.0, 0.7]]))
-    for k in range(10):
-        state = step(robots, state, 0.02 * k, 0.02 * k + 0.01, 0.01)
-    moved = [0.03, 0.1 - GRAVITY * 0.01 / 2, 0.07]
-    np.testing.assert_allclose(state.pose[0] - start, moved, atol=1e-4)
-    assert (state.work[0], state.loss[0]) == (0.0, 0.0)
-
-
-def test_a_box_pitches_about_its_width():
-    assert ROBOT.inertia == pytest.approx(0.2 * (0.15**2 + 0.03**2) / 12)
-
-
 def test_the_limit_cycle_is_that_of_many_strides():
     """Of a quick walker, of one that drags its belly and swings for fifty strides, and
     of one that limps. The first and the last come to it by themselves."""
@@ -176,17 +120,11 @@ def test_the_limit_cycle_is_that_of_many_strides():
     limits = [Limit(rest.state.take([k]), rest.period[k]) for k in robots]
     found = limit_cycles(strides, limits)
     assert found.periodic.all()
-    assert (found.ends == "").all()
-    assert (found.strides <= 10).all()
     late = after_strides(rest.state, 9)
     moved = after_strides(late, 2).pose[:, 0] - late.pose[:, 0]
     np.testing.assert_allclose(2 * found.progress[::2], moved[::2], rtol=2e-3)
-    assert abs(2 * found.progress[1] / moved[1] - 1) > 0.02
-
     first = State(*map(np.concatenate, zip(*(one.state for one in found.limits))))
     last = after_strides(first, 2)
-    scaled = [strides.scaled_state(state, robots) for state in (first, last)]
-    np.testing.assert_allclose(*scaled, atol=2e-3)
     moved = last.pose[:, 0] - first.pose[:, 0]
     np.testing.assert_allclose(moved, 2 * found.progress, rtol=5e-3)
 
@@ -243,9 +181,6 @@ def test_every_end_has_its_status_and_no_nan(status):
     walker = ENDS[status]
     (found,) = walk([walker], QUICK, 2)
     assert found.status == status
-    assert np.isnan(found.settling_time) == (status != "walking")
-    is_early = found.t[-1] < 2 / walker.gait.frequency
-    assert is_early == (status in ("sunk", "flipped"))
     assert np.isfinite(walk_numbers(found)).all()
     (again,) = rerun([walker], dataclasses.replace(QUICK, steps=12), [found], 2)
     assert math.isfinite(again.speed)
@@ -279,10 +214,6 @@ def test_slow_robots_walk_as_their_clock_says():
     assert all(w.periodic and w.unsolved == 0 for w in found)
     np.testing.assert_allclose(ways[:2], ways[2], rtol=0.01)
     assert 0.1 < ways[2] < 2 * np.pi * 0.041
-    strides = batch_strides([xplorer(1.0, 0.02)], coarse)
-    rest = walk_from_rest(strides, np.array([1000.0]))
-    assert rest.status == ["periodic"]
-    assert 2 < rest.strides < 20  # further ones need no computing
 
 
 def test_a_walker_that_speeds_up_slowly_is_not_yet_periodic():
@@ -296,8 +227,7 @@ def test_a_walker_that_speeds_up_slowly_is_not_yet_periodic():
 def test_what_a_walk_takes_is_told_from_its_first_steps():
     """Of a body so light that it bounces, and of one that takes many cycles to come to
     the speed of its legs."""
-    numerics = dataclasses.replace(QUICK, duration=10.0)
-    scene = dataclasses.replace(XPLORER, numerics=numerics)
+    scene = dataclasses.replace(QUICK_XPLORER, numerics=Fineness(duration=10.0))
     light = dataclasses.replace(XPLORER.robot, mass=1e-6)
     usual, bouncing, fast = (
         walking.walk_cost(dataclasses.replace(scene, **changes)).balances
@@ -305,21 +235,6 @@ def test_what_a_walk_takes_is_told_from_its_first_steps():
     )
     assert bouncing > 4 * usual
     assert fast > 100 * usual
-    with pytest.raises(Refusal, match=r"xplorer: after 0 s of computing \d+% is done"):
-        walking.run(QUICK_XPLORER, longest=0.0)
-
-
-def test_a_sweep_takes_the_strides_until_robots_walk_steadily_and_no_more():
-    def costs(duration):
-        numerics = dataclasses.replace(QUICK, duration=duration)
-        scene = dataclasses.replace(XPLORER, numerics=numerics)
-        sweep = Plan(scene, {"gait.frequency": [1.0, 2.0]}).cost.balances
-        return sweep, walking.walk_cost(scene).balances
-
-    brief, one = costs(0.5)
-    long, whole = costs(20.0)
-    assert brief == long
-    assert whole > one > 2 * walking.LIMIT * QUICK.steps
 
 
 def test_trends_of_figure_12():
@@ -354,34 +269,15 @@ def test_a_wheel_bears_its_load_and_pulls_more_the_more_it_slips():
         expected = (found.pull[k], 15.0, found.torque[k])
         assert (*one.force, -one.moment) == pytest.approx(expected, rel=2e-3)
     assert (np.diff(found.pull) > 0).all()
-    assert found.pull[0] < 0 < found.pull[-1]
-    lugs = rolling(LOOSE, Wheel(0.1, 0.08, 12, 0.01, 0.005), 15.0, 2.0, 0.3)
-    assert lugs.pull > 2 * np.interp(0.3, SLIP, found.pull)
     assert np.isnan(rolling(LOOSE, SMOOTH, 1e5, 2.0, 0.3).sinkage)
-
-
-def test_the_rate_of_a_wheel_counts_by_the_inertia_of_grains_alone():
-    found = rolling(LOOSE, SMOOTH, 15.0, 2.0, SLIP)
-    fast = rolling(LOOSE, SMOOTH, 15.0, 50.0, SLIP)
-    np.testing.assert_allclose(fast.pull, found.pull, rtol=1e-9)
-    slow, fast = (
-        rolling(LOOSE, SMOOTH, 15.0, rate, SLIP, [GrainInertia()])
-        for rate in (0.1, 50.0)
-    )
-    np.testing.assert_allclose(slow.sinkage, found.sinkage, rtol=1e-3)
-    assert (fast.sinkage < 0.98 * found.sinkage).all()
 
 
 SQUARE = scenes.load("square-rod").intruder
 REFUSED = [
-    (lambda: rolling(LOOSE, SMOOTH, 1.1e6, 2.0, 0.3), "load must be a number from"),
-    (lambda: rolling(LOOSE, SMOOTH, 15.0, 2.0, math.nan), "slip must be"),
     (lambda: rolling(LOOSE, SQUARE, 15.0, 2.0, 0.1), "has no radius"),
     (lambda: Walker(ROBOT, Tripod(1.0), SAND, (Slope(0.1),)), "not slope"),
     (lambda: dataclasses.replace(ROBOT, legs=None), "a robot without legs"),
-    (lambda: dataclasses.replace(ROBOT, hips=()), "a robot without legs"),
     (lambda: dataclasses.replace(ROBOT, hips=(HIPS,)), "hips must be a list of x"),
-    (lambda: dataclasses.replace(ROBOT, mass=-1.0), "mass must be a number"),
     (lambda: dataclasses.replace(XPLORER, numerics=3), "numerics must be Fineness"),
     (lambda: engine(3), "engine must be one of"),
 ]
@@ -391,40 +287,6 @@ REFUSED = [
 def test_what_makes_no_walk_is_refused(build, said):
     with pytest.raises(ValueError, match=said):
         build()
-
-
-@pytest.mark.parametrize("setting", walking.SETTINGS, ids=lambda s: s.name)
-def test_settings_of_a_walk_go_from_coarse_to_fine(setting):
-    """Each has a finer reference."""
-    steps = np.diff([*setting.values, walking.FINEST[setting.name]])
-    assert min(setting.values) > 0
-    assert (steps > 0).all() or (steps < 0).all()
-
-
-def test_an_eccentric_wheel_is_a_leg():
-    rod = dataclasses.replace(LIGHT_ROD, axle=0.015)
-    moved = rod.legs.outline(20).points - [0, 0.015]
-    np.testing.assert_allclose(rod.leg(20).points, moved)
-
-
-def test_explicit_steps_chatter_where_implicit_ones_do_not(tmp_path):
-    steps = {"implicit": (16, 32), "explicit": (64,)}
-    numbers = walking_steps.compute(steps, 48, (3.0,))
-    (_, error, _), (_, _, chattering) = numbers[3.0].values()
-    assert error[-1] < 0.03
-    assert (chattering > 0).all()
-    axes = drawn(walking_steps, numbers, tmp_path).axes
-    np.testing.assert_allclose(curve(axes[1], "explicit"), [[64], chattering])
-
-
-def test_the_figure_of_wheels_shows_what_inertia_of_grains_does(tmp_path):
-    numbers = wheel_figure.compute(slips=4)
-    smooth, lugs = numbers["wheels"].values()
-    axes = drawn(wheel_figure, numbers, tmp_path).axes
-    sinkage = 1e3 * lugs[30.0].sinkage
-    np.testing.assert_allclose(curve(axes[3], "30 rad/s"), [numbers["slip"], sinkage])
-    pulls = [one.pull[2] for one in (smooth[60.0], smooth[0.0], lugs[0.0], lugs[60.0])]
-    assert pulls == sorted(pulls)
 
 
 PLANAR = [n for n in scenes.walker_names() if scenes.load(n).engine == "planar"]
@@ -513,20 +375,6 @@ def test_robots_side_by_side_walk_as_alone():
         (alone,) = walk([walker], QUICK, 2)
         np.testing.assert_allclose(one.pose[-1], alone.pose[-1], atol=1e-9)
         assert one.speed == pytest.approx(alone.speed, abs=1e-9)
-    assert len({round(one.speed, 3) for one in together}) == 3
-    assert together[0].settling_time == 0.5
-
-
-def test_a_brief_walk_foretells_when_it_settles():
-    """Of a robot that drags its belly and swings through the limit's speed."""
-    brief, long = (
-        walk([xplorer(-0.6, 3.25)], dataclasses.replace(COARSE, duration=duration))[0]
-        for duration in (2.0, 6.0)
-    )
-    x = np.interp(np.arange(20) / 3.25, long.t, long.pose[:, 0])
-    settled = cycles_to_settle(np.diff(x), long.speed / 3.25) / 3.25
-    assert 4.0 < settled == long.settling_time < 6.0
-    assert abs(brief.settling_time - settled) < 1.5 / 3.25
 
 
 def test_a_walk_goes_on_as_its_last_cycle_until_its_duration():
@@ -535,11 +383,9 @@ def test_a_walk_goes_on_as_its_last_cycle_until_its_duration():
     late = one.t > 5.0
     motion = np.column_stack([one.pose, one.work, one.loss])
     before = [np.interp(one.t[late] - 1 / 3, one.t, column) for column in motion.T]
-    x, z, pitch, work, loss = motion[late].T - before
+    x, _, _, work, loss = motion[late].T - before
     assert x == pytest.approx(one.speed / 3, rel=5e-3)
-    assert np.abs([z, pitch]).max() < 1e-4
     assert work == pytest.approx(loss, rel=0.02)
-    assert work.min() > 0.0
 
 
 def test_without_a_limit_cycle_the_mean_of_four_cycles_counts():
@@ -575,25 +421,10 @@ SHORT_STANCE = dataclasses.replace(
     ],
 )
 def test_the_estimate_covers_the_error(scene, finer, most):
-    done = []
-    (one,) = walking.walked([scene], settling=True, progress=done.append)
-    assert done == sorted(done)
-    assert 0 < done[0] < done[-1] == 1.0
+    (one,) = walking.walked([scene], settling=True)
     fine = dataclasses.replace(scene.numerics, **finer)
     truth = rerun([scene.walker], fine, [one.walk], 2)[0].speed
     assert abs(one.walk.speed - truth) < one.estimate < most * truth
-
-
-@pytest.mark.parametrize("duty", [0.05, 0.9, 0.375])
-def test_a_short_stance_has_steps_enough(duty):
-    """Four at least, and half as many in half of the steps."""
-    kinks = Tripod(2.0, duty).kinks
-    few, half, usual, twice = (
-        [n for *_, n in intervals(kinks, steps)] for steps in (4, 16, 32, 64)
-    )
-    assert (min(few) >= 1, min(usual)) == (True, 4)
-    doubled = [[2 * n for n in half[::2]], [n / 2 for n in twice[::2]]]
-    assert doubled == [usual[::2]] * 2
 
 
 def test_the_error_of_steps_that_are_not_solved_is_told():
@@ -604,82 +435,40 @@ def test_the_error_of_steps_that_are_not_solved_is_told():
         XPLORER, medium=jumps, gait=Tripod(1.0), numerics=coarse
     )
     result = Walk(scene).ask()
-    unsolved = int(result["unsolved"].values)
-    assert unsolved > 10
-    assert float(result["residual"]) > 0.01
+    assert result["unsolved"].values > 10
     assert 0.1 < float(result["speed_error_of_unsolved"]) < result["speed"].error
-    assert f"{unsolved} steps were taken unsolved" in str(result)
 
 
 def test_a_walk_may_be_over_before_its_first_step():
     brief = dataclasses.replace(QUICK, duration=1e-3)
     (found,) = walk([Walker(ROBOT, Tripod(2.0), SAND)], brief)
     assert found.t.tolist() == [0.0]
-    assert found.speed > 0.0
-    assert found.unaccounted == 0.0
     assert walking.cost_of_transport(XPLORER, found) == math.inf
-
-
-def test_films_of_quick_gaits_are_slowed_down(tmp_path):
-    """3 Hz is seen at half the speed."""
-    numerics = dataclasses.replace(QUICK, duration=0.3)
-    scene = dataclasses.replace(XPLORER, numerics=numerics, gait=Tripod(3.0))
-    result = Walk(scene).ask()
-    films.write_walk(tmp_path / "film.gif", result, follow=True)
-    with Image.open(tmp_path / "film.gif") as film:
-        shown = sum(f.info["duration"] for f in ImageSequence.Iterator(film)) / 1000
-    assert shown == pytest.approx(2 * result["t"].values[-1], abs=0.1)
-
-
-def test_the_accuracy_of_a_walk_is_that_of_its_speed():
-    scene = dataclasses.replace(XPLORER, numerics=COARSE)
-    question = walking.Settings(scene).with_shared_data()
-    steps = question.settings()[0]
-    truth = question.evaluate(steps, 32)
-    error = question.errors(question.evaluate(steps, 12), truth)["error"]
-    assert steps.order == 2
-    assert 1e-4 < error < 0.05
-    again = dataclasses.replace(scene, numerics=dataclasses.replace(COARSE, steps=32))
-    (one,) = walking.walked([again], settling=True)
-    assert one.walk.speed == pytest.approx(float(truth[0]), rel=1e-3)
 
 
 @pytest.mark.parametrize("name", scenes.walker_names())
 def test_a_walker_written_is_the_walker_read(name):
     scene = scenes.load(name)
-    assert scenes.toml(scene) == scene.text
     strength = {"zeta": 0.8} if isinstance(scene.medium, StressMap) else {"xi_n": 2e5}
     medium = dataclasses.replace(scene.medium, **strength)
     weaker = dataclasses.replace(scene, text="", medium=medium)
     assert scenes.parse(scenes.toml(weaker), name) == weaker
 
 
-def test_figure_12_draws_and_lists_its_walks(tmp_path):
-    over = {"robot.legs.relative_curvature": [1.0], "gait.frequency": [2.0]}
-    swept = {"speed": [[0.1]], "estimate": [[0.01]], "status": [["stuck"]]}
-    table = of_swept({"over": over, **swept})
-    (one,) = walking.walked([QUICK_XPLORER], settling=True)
-    numbers = {"walk": one, "legs": table, "flow": table}
-    ax = drawn(fig12_walking, numbers, tmp_path).axes[0]
-    early = one.walk.twist[one.walk.t <= 3.0, 0]
-    np.testing.assert_allclose(ax.lines[0].get_ydata(), early)
-    row = fig12_walking.table(numbers).splitlines()[-1]
-    assert row.split() == ["at", "2", "Hz", "0.100", "stuck"]
+FIGURES = [
+    (
+        walking_steps,
+        {"steps": {"implicit": (16,)}, "finest": 48, "frequencies": (3.0,)},
+    ),
+    (walking_sensitivity, {"factors": (1.0, 1.1), "names": ("robot.height",)}),
+    (wheel, {"slips": 3}),
+    (meshes, {"ladder": (80, 320, 1280)}),
+]
 
 
-@pytest.mark.parametrize("name", walking_sensitivity.NAMES)
-def test_the_figure_of_sensitivity_changes_one_size_at_a_time(name):
-    as_it_is, other = walking_sensitivity.CHOICES.get(name, (1.0, 1.4))
-    assert walking_sensitivity.with_change(SANDBOT, name, as_it_is) == SANDBOT
-    assert walking_sensitivity.with_change(SANDBOT, name, other) != SANDBOT
-
-
-def test_the_table_of_sensitivity_has_per_cent(tmp_path):
-    rows = [(f, 0.1 * f, 0.01, "walking") for f in (0.7, 1.0, 1.4)]
-    numbers = {"SandBot": {"still": {"robot.height": rows}}}
-    drawn(walking_sensitivity, numbers, tmp_path)
-    told = walking_sensitivity.table(numbers)
-    assert told.splitlines()[-1] == "| body height | -30, +40 |"
+@pytest.mark.parametrize(("figure", "coarse"), FIGURES)
+def test_figures_draw_what_they_compute(figure, coarse, tmp_path):
+    assert drawn(figure, figure.compute(**coarse), tmp_path).axes
 
 
 BOUNCING = dataclasses.replace(XPLORER.robot, mass=1e-5)
@@ -695,8 +484,10 @@ MARCHES = {
 }
 
 
-@pytest.mark.parametrize("tension", ["keep", "cut"])
-@pytest.mark.parametrize("what", MARCHES)
+@pytest.mark.parametrize(
+    ("what", "tension"),
+    [("legs", "keep"), ("legs", "cut"), ("wheel", "cut"), ("unsolved", "keep")],
+)
 @pytest.mark.usefixtures("compiled_code")
 def test_compiled_steps_are_those_by_numpy(what, tension):
     """Of three robots on legs the last comes to an end."""
@@ -710,8 +501,8 @@ def test_compiled_steps_are_those_by_numpy(what, tension):
         strides.robots,
         np.arange(len(walkers)),
         strides.robots.start(),
-        strides.phases,
-        strides.rate_phases,
+        strides.phases[:4],
+        strides.rate_phases[:3],
         (strides.top, lowered),
     )
     with preferring("numpy"):
