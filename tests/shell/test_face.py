@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 
 import geomech
 import rft
-from geomech import Refusal
+from geomech import Refusal, plots
 from geomech.mathematics.gaits import (
     Circle,
     Wave,
@@ -82,13 +82,13 @@ def test_what_makes_no_scene_is_refused(parts, says):
 def test_a_table_of_displacements_prints_and_plots_itself(study):
     table = study.displacement([0.5, 1.0], "direct")
     assert "displacement per cycle, direct tier" in repr(table)
-    ax = table.plot()
+    ax = table.plot(ax=plots.figure(3.0, 3.0)[1][0, 0])
     assert_allclose(ax.lines[0].get_ydata(), table["net_distance"].values[0])
     assert ax.get_ylabel() == "net distance per cycle (BL)"
 
 
 def test_a_study_draws_and_films(study, tmp_path):
-    drawn = study.ccf().plot(component="theta")
+    drawn = study.ccf().plot(component="theta", ax=plots.figure(3.0, 3.0)[1][0, 0])
     assert drawn.get_title().endswith("turning")
     assert study.animate(tmp_path / "a.gif").read_bytes().startswith(b"GIF")
 
@@ -104,7 +104,7 @@ def test_a_velocity_makes_a_study(study):
     moved = geomech.study(slide, Circle(0.5), **SMALL).displacement(tiers="direct")
     assert_allclose(moved["y"].values, np.pi / 4)
     options = {"limits": 1.0, "harmonics": 1}
-    best = geomech.study(slide, grid=7).optimize("displacement", **options)
+    best = geomech.study(slide, **SMALL).optimize("displacement", **options)
     assert float(best["value"]) == pytest.approx(np.pi, rel=1e-3)
 
 
