@@ -287,7 +287,10 @@ def test_the_speed_does_not_matter_under_a_law_of_one_power(law):
     ("traction", "said"),
     [
         (lambda t, n: (t, n), r"traction must take \(v_t, v_n, rounding=0.0\)"),
-        (lambda t, n, eps=0.0: (t, np.ones(5)), r"shape \(2, 3\), got \(2, 3\) and \(5,"),
+        (
+            lambda t, n, eps=0.0: (t, np.ones(5)),
+            r"shape \(2, 3\), got \(2, 3\) and \(5,",
+        ),
         (lambda t, n, eps=0.0: 1 / 0, "traction fails: ZeroDivisionError"),
         (lambda t, n, eps=0.0: (-t, -n), "no drag at any velocity"),
     ],
