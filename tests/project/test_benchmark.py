@@ -231,19 +231,20 @@ fromto="0 0 0 0 0 -.08"/></body>"""
 MOTOR = '<velocity joint="j{}" kv="0.05" ctrlrange="-20 20"/>'
 
 
-def rate(model, steps=4000, height=0.0):
-    """Steps a second, the best of three runs."""
+def seconds(model, steps=4000, runs=3, stance=8.0, speed=0.0, height=0.0):
+    """The least time of a step: of each twenty of a run the least, summed. The controls
+    are those of a stance, and grow with the time."""
     import mujoco
 
-    found = []
-    for _ in range(3):
+    times = np.empty((runs, steps // 20))
+    for row in times:
         data = mujoco.MjData(model)
         data.qpos[2] += height
-        data.ctrl[:] = 8.0
-        mujoco.mj_step(model, data, 200)
-        took = shortest_time(lambda data=data: mujoco.mj_step(model, data, steps), 1)
-        found.append(steps / took)
-    return max(found)
+        data.qpos[7:] = stance
+        for k in range(len(row)):
+            data.ctrl[:] = speed * data.time + stance
+            row[k] = shortest_time(lambda data=data: mujoco.mj_step(model, data, 20), 1)
+    return times.min(0).sum() / steps
 
 
 def test_sand_under_a_hexapod():
@@ -259,35 +260,34 @@ def test_sand_under_a_hexapod():
     text = HEXAPOD.format(legs, "".join(map(MOTOR.format, range(6))))
     model = mujoco.MjModel.from_xml_string(text)
     bare = mujoco.MjModel.from_xml_string(text)
-    rates = {"rigid floor": rate(bare)}
+    took = {"rigid floor": seconds(bare)}
     bare.geom_contype[0] = 0
     bare.geom_conaffinity[0] = 0
-    rates["no floor"] = rate(bare)
+    took["no floor"] = seconds(bare)
     for law in ("poppy-seeds-loose", Spatial(3e5)):
         forms = {"compiled": {}, "a boundary below": {"regions": {"y > 0": law}}}
         for spacing in (0.02, 0.01):
             prints = sands.Footprints(spacing, 3.0, 2.0)
             forms[f"footprints of {100 * spacing:.0f} cm"] = {"footprints": prints}
         with preferring("numpy"), sands.attach(model, law, element=0.035):
-            rates["NumPy"] = rate(model, 150)
+            took["NumPy"] = seconds(model, 140)
         for name, more in forms.items():
             with preferring("numba"), sands.attach(model, law, element=0.035, **more):
-                rates[name] = rate(model)
+                took[name] = seconds(model)
         with preferring("numba"), sands.attach(model, law, element=0.035) as sand:
-            rates["above the sand"] = rate(model, height=30.0)
+            took["above the sand"] = seconds(model, height=30.0)
             if importlib.util.find_spec("mujoco.batch"):
                 batch = sand.batch(64, persistent=True)
                 batch.ctrl = 8.0
                 batch.step(nstep=50)
-                took = shortest_time(lambda batch=batch: batch.step(nstep=200), 1)
-                rates[f"64 in a Batch on {os.cpu_count()} cores"] = 64 * 200 / took
-        share = 1 / rates["compiled"] - 1 / rates["no floor"]  # s a step
-        print(
-            f"\n{law}: {sand.elements} elements, {sand.elements / share:.1e} a second"
-        )
-        for name, x in rates.items():
-            print(f"| {name} | {x:,.0f} | {x / rates['NumPy']:.1f} |")
-        assert rates["compiled"] > 10 * rates["NumPy"]
+                all_cores = f"64 in a Batch on {os.cpu_count()} cores"
+                step = functools.partial(batch.step, nstep=200)
+                took[all_cores] = shortest_time(step) / 64 / 200
+        rate = sand.elements / (took["compiled"] - took["no floor"])
+        print(f"\n{law}: {sand.elements} elements, {rate:.1e} a second")
+        for name, x in took.items():
+            print(f"| {name} | {1 / x:,.0f} | {took['NumPy'] / x:.1f} |")
+        assert took["NumPy"] > 10 * took["compiled"]
 
 
 TRIPOD = np.pi * np.array([0, 1, 1, 0, 0, 1])
@@ -301,32 +301,21 @@ def test_a_step_in_sand_over_one_without(robot, stance, speed):
     """Of the hexapod that walks and of a quadruped that stands, at 2 ms, by elements of
     the geoms' own shapes: a step in sand over one in nothing, and NumPy over compiled
     code."""
-    mujoco = pytest.importorskip("mujoco")
+    pytest.importorskip("mujoco")
     from rft import mujoco as sands
     from rft.mujoco.example import hexapod
 
-    def seconds(steps=400, runs=5):
-        """The least time of a step: of each twenty of a run the least, summed."""
-        times = np.empty((runs, steps // 20))
-        for row in times:
-            data = mujoco.MjData(model)
-            data.qpos[7:] = stance
-            for k in range(len(row)):
-                data.ctrl[:] = speed * data.time + stance
-                begin = time.thread_time()
-                mujoco.mj_step(model, data, 20)
-                row[k] = time.thread_time() - begin
-        return times.min(0).sum() / steps
-
     model = hexapod() if robot == "hexapod" else quadruped(0.002)
+    how = {"stance": stance, "speed": speed}
     with preferring("numpy"), sands.attach(model, "poppy-seeds-loose"):
-        by_numpy = seconds(40, 1)
+        by_numpy = seconds(model, 40, 1, **how)
     with preferring("numba"), sands.attach(model, "poppy-seeds-loose") as sand:
-        took = seconds()
-        slower = by_numpy / seconds(40)
+        took = seconds(model, 400, **how)
+        slower = by_numpy / seconds(model, 40, **how)
         assert sand.effort.unsolved == 0
     model.geom_contype[:] = 0
     model.geom_conaffinity[:] = 0
+    without = seconds(model, 400, **how)
     print(f"\n{robot}: {sand.elements} elements, {1e6 * took:.0f} us a step,", end=" ")
-    print(f"over one in nothing {took / seconds():.1f}, by NumPy {slower:.0f} times")
+    print(f"over one in nothing {took / without:.1f}, by NumPy {slower:.0f} times")
     assert slower > 10

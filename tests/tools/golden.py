@@ -306,7 +306,11 @@ def costs():
         told.append(asked)
         asked.check("", False)
 
-    with pytest.MonkeyPatch.context() as patch, backend.preferring("numpy"):
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        backend.preferring("numpy"),
+        frozen.place(),
+    ):
         patch.setattr(pipeline, "decide", refuse)
         patch.setattr(cost, "LONGEST", 0.0)  # nothing is begun
         for kind, (known, *lines) in ASKED.items():
@@ -314,8 +318,7 @@ def costs():
                 words = line.format(name)
                 if re.search(SLOW, words):
                     continue
-                with frozen.place():
-                    frozen.geomech(*words.split())
+                frozen.geomech(*words.split())
                 for asked in told:  # none of a scene that is refused
                     numbers = [asked.balances, asked.memory]
                     if kind != "walker":
