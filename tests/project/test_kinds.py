@@ -19,7 +19,7 @@ from geomech.scenes import Numerics, Scene, kinds, load, parse, sources, toml
 from geomech.scenes.kinds import load_file
 from geomech.studies.estimates import estimate
 from geomech.studies.scene_tables import SceneTables
-from rft import Backbone, Chain, Coulomb, Granular, Viscous, body_velocity
+from rft import Chain, Coulomb, Granular, Viscous, body_velocity
 from rft.core.refusal import Refusal
 from rft.laws.base import TermLaw, is_rate_independent
 
@@ -73,16 +73,6 @@ def test_a_law_of_traction_alone_gives_every_tier_within_its_error(law):
     poses, errors = estimate.direct(bare.scene, gait, amplitudes, 64)
     truth = estimate.direct(exact.scene, gait, amplitudes, 256)[0]
     assert (estimate.pose_distance(poses, truth, 1.0) <= errors + 1e-9).all()
-
-
-def test_a_law_of_traction_alone_takes_backbones():
-    fine = Swimmer(Bare(Coulomb()), Backbone(8, length=0.4))
-    exact = Swimmer(Coulomb(), Backbone(8, length=0.4))
-    alpha = np.full((2, 7), 0.3) * [[1], [-2]]
-    alphadot = np.cos(np.arange(14.0)).reshape(2, 7)
-    velocities = [s.velocity(alpha, alphadot) for s in (fine, exact)]
-    np.testing.assert_allclose(*velocities, atol=2e-3)
-    assert fine.balance_size.evaluations == 24 * exact.balance_size.evaluations
 
 
 @pytest.mark.parametrize("name", [name for name in EFFECTS if name != "end-caps"])

@@ -133,24 +133,6 @@ def test_a_gait_off_the_field_is_refused_by_every_command_alike(gait, tmp_path):
     assert geomech("accuracy", "s.toml", cwd=folder) == told
 
 
-@pytest.mark.parametrize(
-    ("command", "text"),
-    [
-        ("run", PLAIN.replace('"circle"', '"ellipse"\nsemi_axes = [0, 0]')),
-        (
-            "run",
-            PLAIN.replace('"chain"', '"backbone"\nelements = 8').replace(
-                '"circle"', '"sine"\nelements = 8\namplitude = 0'
-            ),
-        ),
-        ("accuracy", PLAIN + "amplitude = 0"),
-    ],
-)
-def test_what_does_not_move_is_refused(command, text, tmp_path):
-    told = geomech(command, "s.toml", cwd=scene(tmp_path, text))
-    assert told == (2, "", "error: s.toml: [gait] does not move: give it a size\n")
-
-
 AXES = connection.grid(2, 5, 1.0)
 
 

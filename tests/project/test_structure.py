@@ -11,33 +11,6 @@ import tomllib
 import pytest
 
 ROOT = pathlib.Path(__file__).parents[2]
-# Beside the systems: commands list the named media and ask a stress map; an intruder
-# has a law, a body and effects but no system; a sweep puts effects side by side; a
-# calibration fits a law; a robot that walks has a map and no system, and a map of
-# stress is written by its coefficients. Workers tell the solver to take one thread, and
-# by which back end. Environments for learning stand on sand, and measured midlines are
-# put into a medium.
-KNOW_MECHANICS = {
-    "gym/hexapod.py",
-    "run/backend.py",
-    "scenes/terradynamics/intruder.py",
-    "scenes/terradynamics/intruding.py",
-    "scenes/terradynamics/solid.py",
-    "scenes/terradynamics/stress.py",
-    "scenes/terradynamics/walker.py",
-    "scenes/write.py",
-    "shell/describe/builtin.py",
-    "shell/describe/grains.py",
-    "shell/describe/system.py",
-    "studies/displacement/batch.py",
-    "studies/grains/drag.py",
-    "studies/grains/swim.py",
-    "studies/measured/midlines/predicted.py",
-    "studies/terradynamics/calibration.py",
-    "studies/terradynamics/stress.py",
-    "studies/terradynamics/stress_calibration.py",
-    "studies/terradynamics/walking.py",
-}
 
 
 @functools.cache
@@ -48,17 +21,18 @@ def nodes(path):
 
 # Of rft the mathematics of a connection knows errors and planar motions alone.
 ABSTRACT = ("rft.core", "rft.formulas.se2")
+PURE = (
+    "geomech.mathematics.gaits",
+    "geomech.mathematics.geometry",
+    "geomech.mathematics.tiers",
+)
 
 
-def test_pure_geometry_knows_planar_motions_alone(imported):
-    users = set()
+def test_the_mathematics_of_gaits_knows_planar_motions_alone(imported):
     for name, others in imported.items():
-        mechanics = {x for x in others if x.startswith("rft")}
-        mechanics -= {x for x in others if x.startswith(ABSTRACT)}
-        if name.startswith("geomech") and mechanics:
-            users.add(FILES[name].relative_to(ROOT / "geomech").as_posix())
-    others = {x for x in users if not x.startswith("mathematics/systems/")}
-    assert others == KNOW_MECHANICS
+        if name.startswith(PURE):
+            mechanics = {x for x in others if x.startswith("rft")}
+            assert mechanics == {x for x in mechanics if x.startswith(ABSTRACT)}, name
 
 
 def modules():
