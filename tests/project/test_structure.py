@@ -2,7 +2,6 @@
 motions alone."""
 
 import ast
-import functools
 import graphlib
 import pathlib
 import re
@@ -11,12 +10,6 @@ import tomllib
 import pytest
 
 ROOT = pathlib.Path(__file__).parents[2]
-
-
-@functools.cache
-def nodes(path):
-    """All nodes of the tree of a file."""
-    return [*ast.walk(ast.parse(path.read_text()))]
 
 
 # Of rft the mathematics of a connection knows errors and planar motions alone.
@@ -45,32 +38,27 @@ def modules():
     return found
 
 
-def names_imported(node):
-    """Return dotted names that a node of a syntax tree imports."""
-    match node:
-        case ast.Import(names=names):
-            return [alias.name for alias in names]
-        case ast.ImportFrom(module=module, names=names):
-            return [f"{module}.{alias.name}" for alias in names]
-        case ast.Call(
-            func=ast.Name("import_module") | ast.Attribute(_, "import_module")
-        ):
-            return [x.value for x in node.args if isinstance(x, ast.Constant)]
-    return []
+def statements(node):
+    """Yield the statements below a node, inside functions too, but not those that type
+    checkers alone load."""
+    for inner in ast.iter_child_nodes(node):
+        if isinstance(inner, ast.If) and "TYPE_CHECKING" in ast.dump(inner.test):
+            continue
+        if isinstance(inner, (ast.stmt, ast.excepthandler, ast.match_case)):
+            yield inner
+            yield from statements(inner)
 
 
 def arrows(path, known):
-    """Return the modules that a file imports, inside functions too, but not those that
-    type checkers alone load."""
-    unloaded = set()
-    found = set()
-    for node in nodes(path):
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
-            unloaded |= {id(inner) for inner in ast.walk(node)}
-    for node in nodes(path):
-        if id(node) not in unloaded:
-            names = names_imported(node)
-            found |= {x if x in known else x.rpartition(".")[0] for x in names}
+    """Return the modules that a file imports."""
+    text = path.read_text()
+    found = {*re.findall(r'import_module\("([\w.]+)"', text)}
+    for node in statements(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        if isinstance(node, ast.ImportFrom):
+            names = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= {x if x in known else node.module for x in names}
     return found & {*known}
 
 
@@ -115,16 +103,18 @@ SPEAK_OF_OPTIONS = (
     "geomech.questions.shared.texts",
     "geomech.shell",
 )  # parts of commands alone
+OPTION = re.compile(r"(?<!\w)--[a-z]")
 
 
 def test_what_python_reaches_names_arguments_and_no_options():
     """A refusal marks an argument, which a command spells as its option
     (`geomech.shell.terminal`)."""
     for name, path in FILES.items():
-        if name.startswith(("figures", *SPEAK_OF_OPTIONS)):
+        text = path.read_text().replace("geomech scenes --show", "")
+        if name.startswith(("figures", *SPEAK_OF_OPTIONS)) or not OPTION.search(text):
             continue
-        prose = {id(node.value) for node in nodes(path) if isinstance(node, ast.Expr)}
-        for node in nodes(path):
+        nodes = [*ast.walk(ast.parse(text))]
+        prose = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
+        for node in nodes:
             if isinstance(node, ast.Constant) and id(node) not in prose:
-                text = str(node.value).replace("geomech scenes --show", "")
-                assert not re.search(r"(?<!\w)--[a-z]", text), (name, text)
+                assert not OPTION.search(str(node.value)), (name, node.value)
