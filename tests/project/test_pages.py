@@ -130,7 +130,7 @@ def test_commands_on_all_pages_exist_with_their_options_and_names():
             assert not words or is_name(words[0]), (name, words)
 
 
-# They draw for seconds each: test_cli.py runs them; their options and names are looked
+# They draw for seconds each: commands.txt has some; their options and names are looked
 # up above.
 DRAWN = {"run", "ccf", "trajectory"}
 TYPED = {" ".join(line): line for line in commands(README) if len(line) > 1 and line[0] not in DRAWN
