@@ -6,6 +6,7 @@ import pkgutil
 from importlib import import_module
 from importlib.util import find_spec
 
+import frozen
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -98,6 +99,10 @@ def test_the_best_gait_is_a_scene():
     scene = geomech.best_scene(best)
     moved = geomech.displacement(scene, tiers="direct")
     assert_allclose(float(moved["net_distance"][0, 0]), float(best["value"]), rtol=1e-6)
+
+
+def test_a_measured_gait_has_its_connection():
+    assert "A" in geomech.fit_gait(frozen.FOLDER / "log.csv", harmonics=1)
 
 
 def test_a_velocity_makes_a_study(study):

@@ -1,11 +1,17 @@
-"""Old spellings of commands and options keep working."""
+"""Options say what they are for, and old spellings keep working."""
 
 import re
 
 import pytest
 from commands import geomech
 
-from geomech.shell import renamed
+from geomech.shell import cli, renamed
+
+
+def test_every_option_and_argument_says_what_it_is_for():
+    parameters = [x for command in cli.Commands().values() for x in command.params]
+    assert len(parameters) > 100
+    assert [x.name for x in parameters if not x.help] == []
 
 
 @pytest.mark.parametrize("old", renamed.COMMANDS)
