@@ -11,7 +11,7 @@ import time
 
 import numpy as np
 import pytest
-from robots import STANCE, quadruped
+from quadruped import STANCE, quadruped
 
 from figures.accuracy.cost_scaling import (
     NAMES,
