@@ -121,6 +121,13 @@ def test_degrees_are_taken_wherever_angles_are(line, tmp_path):
             np.testing.assert_allclose(variable.values, other, rtol=1e-9, atol=1e-12)
 
 
+def test_a_field_is_as_wide_as_it_is_asked_for(tmp_path):
+    ask = "connection s.toml --extent 120deg --grid 5 -o a.nc"
+    geomech(*ask.split(), cwd=scene(tmp_path, PLAIN))
+    axis = load_result(tmp_path / "a.nc")["alpha_1"].values
+    np.testing.assert_allclose(axis, np.pi / 3 * np.arange(-2, 3), atol=1e-12)
+
+
 @pytest.mark.parametrize(
     "gait", ["amplitude = 2.7", "centre = [2.6, 0]\namplitude = 0.1"]
 )
