@@ -10,22 +10,19 @@ import sys
 
 import pytest
 
+# Before NumPy loads: the processes share the cores already.
 for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(
-        threads, "1"
-    )  # before NumPy loads: the processes share the cores already
+    os.environ.setdefault(threads, "1")
 
 from rft.balance import backend  # noqa: E402
 
 gc.disable()  # until all is read
 backend._preferred.set("numpy")  # "auto" is NumPy, but for `solved_by`
-TRUTHS, COMPILED = pytest.StashKey(), pytest.StashKey()
+TRUTHS = pytest.StashKey()
+COMPILED = pytest.StashKey()
 BY_HAND = {"soak", "benchmark"}
-LAID_OUT = {
-    "test_pictures",
-    "test_figures",
-    "test_shown",
-}  # files that look at pictures as they are
+# Files that look at pictures as they are.
+LAID_OUT = {"test_pictures", "test_figures", "test_shown"}
 
 
 @pytest.fixture
@@ -57,10 +54,8 @@ def pytest_sessionstart(session):
     suite would do so side by side."""
     full = session.config.args_source is session.config.ArgsSource.TESTPATHS
     if full and not hasattr(session.config, "workerinput"):
-        for folder in (
-            "geomech",
-            "rft",
-        ):  # for the processes that tests start, also where Python writes no bytecode
+        # For processes that tests start, also where Python writes no bytecode.
+        for folder in ("geomech", "rft"):
             compileall.compile_dir(pathlib.Path(__file__).parents[1] / folder, quiet=2)
         if backend.installed():
             session.config.stash[COMPILED] = subprocess.Popen(
@@ -87,33 +82,13 @@ def pytest_collection_finish():
 def pytest_sessionfinish(session):
     gc.collect()
     gc.freeze()  # pytest collects five times more, and Python as it ends
-    truths = session.config.stash[TRUTHS]
-    if truths.renew:
-        truths.write()
-    if hasattr(session.config, "workeroutput"):
-        session.config.workeroutput["missing"] = truths.missing
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_testnodedown(node):
-    node.config.stash[TRUTHS].missing += getattr(node, "workeroutput", {}).get(
-        "missing", []
-    )
-
-
-def pytest_terminal_summary(terminalreporter, config):
-    if missing := config.stash[TRUTHS].missing:
-        files = ", ".join(sorted({f"{name}.json" for name in missing}))
-        terminalreporter.write_line(
-            f"{len(missing)} truths were computed, {files} lacks them: pytest --renew-truths"
-        )
+    session.config.stash[TRUTHS].write()
 
 
 def pytest_collection_modifyitems(items):
     for item in items:
-        if BY_HAND & {
-            mark.name for mark in item.iter_markers()
-        } and not item.get_closest_marker("timeout"):
+        by_hand = BY_HAND & {mark.name for mark in item.iter_markers()}
+        if by_hand and not item.get_closest_marker("timeout"):
             item.add_marker(pytest.mark.timeout(4 * 3600))
 
 
@@ -122,11 +97,9 @@ def pytest_xdist_auto_num_workers(config):
     """None (a process for each core) for the whole suite; 0 for tests picked by hand,
     for what prints and what writes."""
     picked = config.args_source is not config.ArgsSource.TESTPATHS
-    return (
-        0
-        if picked or config.option.capture == "no" or config.getoption("--renew-truths")
-        else None
-    )
+    if picked or config.option.capture == "no" or config.getoption("--renew-truths"):
+        return 0
+    return None
 
 
 @pytest.fixture(scope="session")
@@ -152,9 +125,8 @@ def blank_pictures(request, monkeypatch):
         drawn = figure.draw
 
         def blank(fig, renderer):
-            return (
-                None if isinstance(renderer, agg.RendererAgg) else drawn(fig, renderer)
-            )
+            if not isinstance(renderer, agg.RendererAgg):
+                drawn(fig, renderer)
 
         monkeypatch.setattr(figure, "draw", blank)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -186,8 +187,10 @@ def refuse_unwritable(outputs: Sequence[Output], inputs: list[Path]) -> None:
     """Refuse outputs that cannot be written, that are inputs, or that are named
     twice."""
     files = [output.path for output in outputs if not output.folder]
+    # Links may lead to a file that is not there yet.
+    real = [os.path.realpath(path) for path in files]
     for k, path in enumerate(files):
-        if path in files[:k]:
+        if real[k] in real[:k]:
             raise Refusal(
                 f"cannot write {path} twice",
                 instead="give --plot, or another output, another name",

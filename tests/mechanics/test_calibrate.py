@@ -4,10 +4,10 @@ sample; what is no drag is refused."""
 import dataclasses
 import math
 
-import former
 import numpy as np
 import pytest
 from commands import geomech
+from tabled import of_json
 
 from geomech import scenes
 from geomech.io.rows import Rows
@@ -39,20 +39,16 @@ def noisy(seed=0, psi=PSI, size=0.03, medium=Granular(1.8, 0.24)):  # noqa: B008
     )
 
 
-def sample(*options):
-    return former.medium(geomech("fit-medium", "short-rod-drag", "--json", *options)[1])
-
-
 def test_the_sample_has_its_published_fit():
-    found = sample()
-    fitted = found["C"], found["gamma0_deg"], found["k"]
-    assert fitted == pytest.approx((1.49, 12.6, 2.49), rel=0.005)
-    assert found["rms"] == pytest.approx(0.056, abs=0.001)
-    assert found["intervals"]["gamma0_deg"] == pytest.approx([7.5, 17.7], abs=0.5)
+    found = of_json(geomech("fit-medium", "short-rod-drag", "--json")[1])
+    values = found["value"].values  # C, gamma0 (deg), k
+    assert values == pytest.approx([1.49, 12.6, 2.49], rel=0.005)
+    assert float(found["rms"]) == pytest.approx(0.056, abs=0.001)
+    assert found["value"].error[1] == pytest.approx((17.7 - 7.5) / 2, abs=0.5)
     # Eq. 2, with sizes of the file's header.
-    stress = found["k"] * 0.588 * 1030 * 9.81 * 0.030
-    assert found["axial_stress_Pa"] == pytest.approx(stress)
-    assert found["axial_force_N"] == pytest.approx(stress * 2 * 0.008 * 0.080)
+    stress = values[2] * 0.588 * 1030 * 9.81 * 0.030
+    assert float(found["axial_stress"]) == pytest.approx(stress)
+    assert float(found["axial_force"]) == pytest.approx(stress * 2 * 0.008 * 0.080)
 
 
 @pytest.mark.parametrize("C", [0.1, 1.8, 40.0])
@@ -74,6 +70,7 @@ def test_exact_drag_gives_its_law_back(C, gamma0_deg):
     ],
 )
 def test_other_laws(law, medium, names, values):
+    """In a fluid there is no weight of grains."""
     found = fit(law, rod_drag(PSI, *exact(medium)), ROD)
     assert found.names == names
     np.testing.assert_allclose(found.values, values, rtol=1e-9)

@@ -5,31 +5,22 @@ import hashlib
 import importlib.metadata
 import math
 import pathlib
-import re
 import subprocess
 import sys
+import types
 
 import numpy as np
 import pytest
-from commands import geomech
 from registry import EFFECTS
-from tabled import of_json, tabled_json
 
-from geomech.core.entry_points import installed_entries
-from geomech.mathematics.gaits import Circle, Sine
-from geomech.mathematics.systems import Premise, Solver, Swimmer, capability
-from geomech.mathematics.systems.capabilities import Recorded
+from geomech.mathematics.gaits import Circle
+from geomech.mathematics.systems import Premise, Solver, Swimmer
 from geomech.scenes import Numerics, Scene, kinds, load, parse, sources, toml
-from geomech.scenes.format.keys import text
-from geomech.scenes.format.schema import schema
 from geomech.scenes.kinds import load_file
-from geomech.shell.describe.scene import description
-from geomech.shell.describe.system import notes
 from geomech.studies.estimates import estimate
 from geomech.studies.scene_tables import SceneTables
-from rft import Backbone, Chain, Coulomb, EndCaps, Granular, Viscous, body_velocity
+from rft import Chain, Coulomb, Granular, Viscous, body_velocity
 from rft.core.refusal import Refusal
-from rft.core.registry import REGISTRIES
 from rft.laws.base import TermLaw, is_rate_independent
 
 PAGE = (
@@ -63,26 +54,6 @@ SCENE = """[medium]\nlaw = "thick"\nthickness = 3.0\n[body]\nkind = "chain"\nlen
 [gait]\nkind = "circle"\ncentre = [0.2, -0.1]\n[numerics]\ngrid = 7\nphases = 32\n"""
 
 
-def test_the_law_of_the_page_runs_as_it_stands_there(tmp_path, monkeypatch):
-    section = PAGE.partition("## Laws, bodies")[2].partition("\n## ")[0]
-    law = re.search(r"```python\n(.*?)```", section, re.S)[1]
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "power.py").write_text(law)
-    scene = re.search(r"```toml\n(.*?)```", section, re.S)[1]
-    (tmp_path / "power.toml").write_text(scene)
-    command = re.search(r"`geomech (displacement power\.toml .*?)`", section)[1]
-    code, out, err = geomech(*command.split(), "--json", "--tiers", "direct")
-    assert (code, err.count("\n")) == (0, 1)
-    assert "power has no closed form" in err and "gauss:24" in err
-    module = {}
-    exec(law, module)
-    shear = Swimmer(module["Power"](0.4), Chain())
-    expected = shear.run(*Circle().cycle(256, [0.5, 1.0])).net
-    np.testing.assert_allclose(tabled_json(out)["direct"], expected, atol=1e-9)
-    written = {p.name for p in tmp_path.iterdir()}
-    assert written == {"power.py", "power.toml"}  # no cache beside them
-
-
 @pytest.mark.parametrize(
     "law", [Viscous(3.7), Granular(C=2.3, gamma0=0.4)], ids=["viscous", "granular"]
 )
@@ -93,33 +64,15 @@ def test_a_law_of_traction_alone_gives_every_tier_within_its_error(law):
     exact = SceneTables(Scene(Swimmer(law, body), gait, SMALL))
     bare = SceneTables(Scene(Swimmer(Bare(law), body), gait, SMALL))
     finer = bare.with_numerics(loads="gauss:96")  # leaves a quarter
-    for tier in ("area", "direct"):
-        ours = exact.poses(tier, amplitudes=amplitudes)
-        theirs = bare.poses(tier, amplitudes=amplitudes)
-        better = finer.poses(tier, amplitudes=amplitudes)
-        difference = estimate.distance(ours, theirs).max()
-        assert difference < 0.04 * np.hypot(*ours[-1, :2])
-        assert estimate.distance(ours, better).max() <= max(difference / 2, 1e-9)
-    poses, errors = estimate.direct(bare.scene, gait, amplitudes, 128)
-    truth = estimate.direct(exact.scene, gait, amplitudes, 1024)[0]
+    ours, theirs, better = (
+        study.poses("area", amplitudes=amplitudes) for study in (exact, bare, finer)
+    )
+    difference = estimate.distance(ours, theirs).max()
+    assert difference < 0.04 * np.hypot(*ours[-1, :2])
+    assert estimate.distance(ours, better).max() <= max(difference / 2, 1e-9)
+    poses, errors = estimate.direct(bare.scene, gait, amplitudes, 64)
+    truth = estimate.direct(exact.scene, gait, amplitudes, 256)[0]
     assert (estimate.pose_distance(poses, truth, 1.0) <= errors + 1e-9).all()
-    assert exact.tiers == bare.tiers
-
-
-def test_a_law_of_traction_alone_takes_backbones_and_says_its_rule():
-    fine = Swimmer(Bare(Coulomb()), Backbone(8, length=0.4))
-    exact = Swimmer(Coulomb(), Backbone(8, length=0.4))
-    alpha = np.full((2, 7), 0.3) * [[1], [-2]]
-    alphadot = np.cos(np.arange(14.0)).reshape(2, 7)
-    velocities = [s.velocity(alpha, alphadot) for s in (fine, exact)]
-    np.testing.assert_allclose(*velocities, atol=2e-3)
-    assert fine.balance_size.evaluations == 24 * exact.balance_size.evaluations
-    assert "gauss:24" in description(Scene(fine, Sine(elements=8), SMALL))
-    assert fine.refined().solver.loads == "gauss:48"
-    assert capability(fine, Recorded).about()["loads"] == "gauss:24"
-    ruled = fine.with_solver(Solver(loads="midpoint:10"))
-    assert notes(ruled) == ()
-    assert ruled.refined().solver.loads == "midpoint:20"
 
 
 @pytest.mark.parametrize("name", [name for name in EFFECTS if name != "end-caps"])
@@ -149,36 +102,6 @@ def test_the_speed_matters_under_a_law_of_no_one_power(law):
     assert swimmer.traits.lacks == Premise.RATE_INDEPENDENT
     with pytest.raises(ValueError, match="no one power of the speed: use the direct"):
         SceneTables(Scene(swimmer, Circle(), SMALL)).poses("path")
-
-
-def test_a_file_registers_what_is_in_it_and_a_scene_alone_does_not(
-    tmp_path, monkeypatch
-):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "thick.py").write_text(LAW)
-    (tmp_path / "thick.toml").write_text(SCENE)
-    ask = [
-        "velocity",
-        "thick.toml",
-        "--alpha",
-        "0.3,0.2",
-        "--alphadot",
-        "1,0",
-        "--json",
-    ]
-    code, out, err = geomech(*ask)
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert "'thick' is unknown" in err and "--plugin" in err
-    code, out, err = geomech(*ask, "--plugin", "thick.py")
-    assert code == 0
-    xi = body_velocity(Viscous(2.5), Chain((1, 1.4, 0.8)), [0.3, 0.2], [1, 0]).xi
-    np.testing.assert_allclose(of_json(out)["xi"].values, xi, atol=1e-9)
-    other = LAW.replace("thick", "thin").replace("Thick", "Thin")
-    (tmp_path / "more.py").write_text(other)
-    again = geomech("--plugin", "more.py", *ask, "--plugin", "thick.py")
-    assert again[:2] == (0, out)
-    (tmp_path / "thick.py").write_text(LAW.replace("2.5", "1.0"))  # the new one counts
-    assert geomech(*ask, "--plugin", "thick.py")[1] != out
 
 
 @pytest.mark.parametrize("future", [False, True])
@@ -238,12 +161,8 @@ def test_digests_of_own_code_cover_its_sources(name, tmp_path, monkeypatch):
     assert found[0] != found[1] != found[2] != found[0]
 
 
-@pytest.mark.parametrize("folder", ["site-packages", "dist-packages"])
-def test_digests_leave_out_installed_packages_of_any_environment(
-    folder, tmp_path, monkeypatch
-):
-    """Those of the user or of the system, below which an environment may stand."""
-    installed = tmp_path / "lib" / folder
+def test_digests_leave_out_installed_packages(tmp_path, monkeypatch):
+    installed = tmp_path / "lib" / "dist-packages"
     installed.mkdir(parents=True)
     (installed / "thick_installed.py").write_text("")
     (tmp_path / "thick_own.py").write_text("import thick_installed, thick_near")
@@ -319,23 +238,23 @@ def package(tmp_path, monkeypatch):
 def test_a_package_offers_a_law_that_is_loaded_when_asked_for(package):
     package(LAW)
     package("raise RuntimeError('loaded unasked')", "other", dist="broken")
-    assert load("three-link-viscous")
-    assert "sands_laws" not in sys.modules
-    assert "thick" in installed_entries(REGISTRIES["geomech.media"])
+    package("raise RuntimeError", "viscous", dist="clash")
+    # What is built in stands against a package.
+    assert type(load("three-link-viscous").system.medium) is Viscous
     scene = parse(SCENE)
     assert type(scene.system.medium).__module__ == "sands_laws"
     assert parse(toml(scene)) == scene
     assert kinds.code() == {"sands_laws": hashlib.sha256(LAW.encode()).hexdigest()}
 
 
-BROKEN = {
-    "import nothing": " cannot be loaded: ModuleNotFoundError",
-    "x = 1": " cannot be loaded: AttributeError",
-    "Thick = 3": ": 3 is not a law",
-    LAW.replace('"thick"', '"thin"'): ": its law is 'thin': give both one name",
-    LAW.replace("(frozen=True)", ""): ": a law of one's own, Thick, must be a value",
-    "from rft import Chain as Thick": ": Chain is not a law",
-}
+BROKEN = [
+    "import nothing",
+    "x = 1",
+    "Thick = 3",
+    LAW.replace('"thick"', '"thin"'),
+    LAW.replace("(frozen=True)", ""),
+    "from rft import Chain as Thick",
+]
 
 
 @pytest.mark.parametrize("code", BROKEN)
@@ -343,14 +262,7 @@ def test_a_broken_package_is_named_in_one_line(code, package):
     package(code)
     with pytest.raises(Refusal, match="of the package sands 1.2") as caught:
         parse(SCENE)
-    assert f"of the package sands 1.2{BROKEN[code]}" in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_end_caps_take_the_numbers_of_a_granular_law():
-    bare = Bare(Granular(C=1.8, gamma0=0.24))
-    with pytest.raises(ValueError, match="end caps take a granular medium, got Bare"):
-        Swimmer(bare, Chain(), (EndCaps(0.1),))
 
 
 @pytest.mark.parametrize("law", [Viscous(), Coulomb(), Granular(1.8, 0.24)])
@@ -359,103 +271,26 @@ def test_the_speed_does_not_matter_under_a_law_of_one_power(law):
     assert is_rate_independent(Bare(law))
 
 
-class Wrong:
-    def __init__(self, traction):
-        self.answer = traction
-
-    def traction(self, v_t, v_n, eps=0.0):
-        return self.answer(v_t, v_n)
-
-
-class NoRounding:
-    def traction(self, v_t, v_n):
-        return v_t, v_n
-
-
 @pytest.mark.parametrize(
-    ("law", "said"),
+    ("traction", "said"),
     [
-        (NoRounding(), r"NoRounding.traction must take \(v_t, v_n, rounding=0.0\)"),
-        (Wrong(lambda t, n: (t, np.ones(5))), r"shape \(2, 3\), got \(2, 3\) and \(5,"),
-        (Wrong(lambda t, n: 1 / 0), "Wrong.traction fails: ZeroDivisionError"),
-        (Wrong(lambda t, n: (-t, -n)), "no drag at any velocity"),
+        (lambda t, n: (t, n), r"traction must take \(v_t, v_n, rounding=0.0\)"),
+        (
+            lambda t, n, eps=0.0: (t, np.ones(5)),
+            r"shape \(2, 3\), got \(2, 3\) and \(5,",
+        ),
+        (lambda t, n, eps=0.0: 1 / 0, "traction fails: ZeroDivisionError"),
+        (lambda t, n, eps=0.0: (-t, -n), "no drag at any velocity"),
     ],
 )
-def test_a_traction_that_is_none_is_refused_in_one_line(law, said):
-    with pytest.raises(ValueError, match=said) as caught:
-        body_velocity(law, Chain(), np.zeros(2), np.ones(2))
-    assert "\n" not in str(caught.value)
-
-
-BAD_FILES = {
-    "law = ": "line 1: SyntaxError",
-    "import nothing": "line 1: ModuleNotFoundError: No module named 'nothing'",
-    "x = 1\nraise SystemExit(3)": "line 2: SystemExit: 3",
-    "x = 1": 'no class in it has a law = "..."',
-    LAW.replace(
-        '"thick"', '"granular"'
-    ): "is named 'granular', as one that is built in",
-    LAW.replace("(frozen=True)", ""): "must be a value: put @dataclass(frozen=True)",
-    LAW.replace("law =", "law: str ="): "has law as a parameter: write law = 'thick'",
-    LAW.replace('"thick"', "3"): 'has no name: give the class law = "..."',
-    LAW.replace("traction", "drag"): "is no part of a scene: a law is a class with",
-    LAW + LAW.replace("Thick", "Other"): "is named 'thick', as the Thick of",
-    "\udcff": "it is not text",
-    "#" * 1_000_001: "it is larger than 1 MB",
-}
-
-
-@pytest.mark.parametrize("text", BAD_FILES, ids=range(len(BAD_FILES)))
-def test_a_file_that_cannot_be_registered_gets_one_line_and_leaves_nothing(
-    text, tmp_path
-):
-    path = tmp_path / "own.py"
-    path.write_text(text, errors="surrogateescape")
-    with pytest.raises(Refusal, match="^plugin .*own.py") as caught:
-        load_file(path)
-    assert BAD_FILES[text] in str(caught.value)
-    assert kinds.code() == {}
-    assert "thick" not in REGISTRIES["geomech.media"]
-    assert not [name for name in sys.modules if name.startswith("geomech_plugin_own")]
-
-
-def test_a_plug_in_ends_in_py(tmp_path):
-    with pytest.raises(Refusal, match="ends in .py"):
-        load_file(tmp_path / "own.toml")
-
-
-def test_a_name_that_two_packages_offer_is_refused(package):
-    package(LAW)
-    package(LAW, dist="muds")
-    with pytest.raises(Refusal, match="is offered by the package .* and the package"):
-        parse(SCENE)
-
-
-def test_a_built_in_name_stands_against_a_package(package):
-    package(LAW)
-    package("raise RuntimeError", "viscous", dist="clash")
-    told = text("medium")
-    assert 'law = "thick"\nOf the package' in told
-    assert (
-        'law = "viscous"\nNot that of the package clash 1.2, which is refused' in told
-    )
-    media = schema()["$defs"]["gaits"]["medium"]["oneOf"]
-    laws = [medium["properties"].get("law") for medium in media]
-    assert laws.count({"const": "thick"}) == laws.count({"const": "viscous"}) == 1
-    assert type(load("three-link-viscous").system.medium) is Viscous
-
-
-class Loose(Bare):
-    __hash__ = None
-
-
-def test_parts_are_values():
-    with pytest.raises(ValueError, match="frozen"):
-        Scene(Swimmer(Loose(Viscous()), Chain()), Circle())
+def test_a_traction_that_is_none_is_refused(traction, said):
+    with pytest.raises(ValueError, match=said):
+        body_velocity(
+            types.SimpleNamespace(traction=traction), Chain(), np.zeros(2), np.ones(2)
+        )
 
 
 def test_a_part_need_not_be_registered_to_be_used_from_python():
     scene = Scene(Swimmer(Bare(Viscous(math.e)), Chain()), Circle(), SMALL)
-    assert SceneTables(scene).poses("area").shape == (3,)
     with pytest.raises(Refusal, match="Bare is of no kind that a scene file can name"):
         toml(scene)

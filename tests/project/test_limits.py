@@ -15,11 +15,6 @@ from geomech.mathematics.gaits import Butterfly, Circle, Ellipse, Points, Sine
 from geomech.mathematics.geometry import connection, family
 from geomech.mathematics.geometry.representations import harmonics
 from geomech.mathematics.geometry.representations.field import Field
-from geomech.mathematics.systems import Swimmer
-from geomech.mathematics.tiers import fitted
-from geomech.mathematics.tiers.base import Numerics
-from geomech.mathematics.tiers.direct import direct
-from geomech.mathematics.tiers.path import path
 from geomech.questions.measured.fit_gait import FitGait
 from geomech.studies.optimisation.local.objectives import Objective
 from rft import (
@@ -286,66 +281,3 @@ def test_limits_of_what_follows_from_numbers(make, taken, refused):
 def test_every_gait_has_one_centre_and_one_amplitude(gait, bad):
     with pytest.raises(ValueError, match="amplitude|centre"):
         dataclasses.replace(gait, **bad)
-
-
-@pytest.mark.parametrize("highest", [-1, 0, 2, 4])
-def test_harmonics_are_odd(highest):
-    with pytest.raises(ValueError, match="harmonics must be odd"):
-        harmonics.fit(still, connection.grid(2, 4), 12, highest=highest)
-
-
-@pytest.mark.parametrize(
-    ("make", "said"),
-    [
-        (lambda: connection.fit(still, (np.arange(9.0),), degree=2.5), "degree"),
-        (lambda: ConstantCurvature(elements=2), "elements must"),
-        (lambda: Serpenoid(2, waves=0.1), "elements must"),
-        (lambda: ConstantCurvature(elements=12, sections=5), "sections must"),
-        (lambda: ConstantCurvature(elements=12, sections=24), "sections must"),
-        (
-            lambda: Backbone(9).frame_pose("link-10", np.zeros(8), np.zeros(8)),
-            "'link-9', got 'link-10'",
-        ),
-    ],
-)
-def test_counts_of_a_body_are_whole_and_fit_each_other(make, said):
-    with pytest.raises(ValueError, match=said):
-        make()
-
-
-@pytest.mark.parametrize(
-    ("medium", "counts"),
-    [(Viscous(), [8, 12, 16]), (Granular(1.8, 0.2), [8, 48, 64])],
-)
-def test_fits_take_more_directions_of_more_joints(medium, counts):
-    systems = [Swimmer(medium, Chain((1.0,) * links)) for links in (3, 4, 5)]
-    assert [fitted.directions(system, Numerics()) for system in systems] == counts
-
-
-def test_a_field_is_of_31_by_31_shapes_by_default():
-    axes = connection.grid(2)
-    assert [(len(a), a[0], a[-1]) for a in axes] == [(31, -2.5, 2.5)] * 2
-
-
-@pytest.mark.parametrize(
-    ("ask", "shapes", "each"),
-    [
-        (lambda v: connection.fit(v, connection.grid(2, 5), trusted=True), 25, 8),
-        (lambda v: harmonics.fit(v, connection.grid(2, 5)), 25, 24),
-        (lambda v: family.fit(v, Circle(), 1.0), 24, 128),
-        (lambda v: direct(v, Circle(), [0.5, 1.0]), 2, 256),
-        (lambda v: path(v, Circle()), 1, 256),
-    ],
-    ids=["connection", "harmonics", "family", "direct", "path"],
-)
-def test_velocities_asked_for_by_default(ask, shapes, each):
-    """How many shapes or curves, and how many directions or phases at each."""
-    asked = []
-
-    def counted(alpha, alphadot):
-        asked.append(np.broadcast_shapes(alpha.shape, alphadot.shape)[:-1])
-        return still(alpha, alphadot)
-
-    ask(counted)
-    assert sum(math.prod(shape[:-1]) for shape in asked) == shapes
-    assert {shape[-1] for shape in asked} == {each}

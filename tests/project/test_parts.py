@@ -10,18 +10,15 @@ import sys
 import numpy as np
 import pytest
 from commands import geomech
-from tabled import tabled, tabled_json
+from tabled import tabled_json
 
 import geomech as library
-from geomech import plots
 from geomech.mathematics.gaits import Circle
 from geomech.mathematics.geometry.traits import Traits
 from geomech.mathematics.systems.base import Cycle, integrated
 from geomech.scenes import Numerics, Scene, kinds, parse
-from geomech.studies.mechanics.single import diagnosed_velocity
 from geomech.studies.optimisation import optimise
 from geomech.studies.scene_tables import SceneTables
-from rft.core.refusal import Refusal
 from rft.core.registry import REGISTRIES
 
 HEAD = "from dataclasses import dataclass\nimport numpy as np\nimport geomech\n"
@@ -188,13 +185,9 @@ def test_commands_use_one_of_each(name):
     assert code == 0, err
     table = tabled_json(out)
     assert np.isfinite([table["leading"], table["direct"]]).all()
-    code, out, err = geomech("explain", f"{name}.toml", *PLUGINS)
-    assert code == 0 and "egg gait" in out, err
-
-
-def test_a_map_is_drawn_in_a_style_of_ones_own():
-    ask = ["ccf", "swims.toml", "--style", "dots", "--plot", "ccf.png"]
-    assert geomech(*ask, *PLUGINS)[0] == 0
+    ask = ["ccf", f"{name}.toml", "--style", "dots", "--plot", "ccf.png"]
+    code, _, err = geomech(*ask, *PLUGINS)
+    assert code == 0, err
 
 
 def test_a_connection_is_written_in_a_format_of_ones_own(folder):
@@ -210,17 +203,13 @@ def test_a_connection_is_written_in_a_format_of_ones_own(folder):
 class Cart:
     """Five members and nothing else."""
 
-    joints, length, traits = 2, 0.5, Traits(linear=True, joint_angles=True)
+    joints = 2
+    length = 0.5
+    traits = Traits(linear=True, joint_angles=True)
 
     def velocity(self, alpha, alphadot):
-        return np.stack(
-            [
-                np.sin(alpha[..., 0]) * alphadot[..., 1],
-                0 * alpha[..., 0],
-                0.2 * alphadot[..., 0],
-            ],
-            -1,
-        )
+        along = np.sin(alpha[..., 0]) * alphadot[..., 1]
+        return np.stack([along, 0 * along, 0.2 * alphadot[..., 0]], -1)
 
     def run(self, alpha, alphadot, work=False) -> Cycle:
         return integrated(self, alpha, alphadot)
@@ -234,46 +223,31 @@ def sled(alpha, alphadot):
 @pytest.mark.parametrize("name", SCENES)
 def test_a_scene_of_parts_of_ones_own_is_written_and_read_again(name, folder):
     for part in FILES:
-        assert kinds.load_file(folder / f"own_{part}.py")
+        kinds.load_file(folder / f"own_{part}.py")
     scene = library.load(folder / f"{name}.toml")
     numerics = Numerics(grid=8, phases=32)
     again = library.toml(scene.changed(text="", numerics=numerics))
     assert library.toml(parse(again)) == again
 
 
-def test_a_number_of_a_registered_function_is_one_of_the_scene(folder):
-    for name in ("gait", "function"):
-        kinds.load_file(folder / f"own_{name}.py")
-    assert library.load("skate.toml").changed(grip=0.7).system.wrapped.grip == 0.7
-
-
 @pytest.mark.parametrize("system", [Cart(), sled])
-def test_five_members_and_functions_go_through_everything(system, tmp_path):
+def test_five_members_and_functions_go_through_everything(system):
     """No base class and no name are needed."""
     gait = Circle(amplitude=0.5, centre=(0.1, 0.2))
     scene = Scene(system, gait, Numerics(grid=7, extent=1.5, phases=32))
     study = SceneTables(scene)
     assert study.tiers[-1] == "direct" and {"area", "adapted", "path"} <= {*study.tiers}
     result = study.displacements([0.3, 0.5], study.tiers)
-    table = tabled(result)
-    truth = np.array(table["direct"])
-    assert np.abs(truth[:, 0]).min() > 0.01
-    for tier in study.tiers:
-        distance = np.hypot(*(np.array(table[tier]) - truth).T[:2])
-        assert (distance <= 1e-9 + np.array(table["estimate"][tier])).all(), tier
+    error = result["net_distance"].error
+    distance = np.hypot(result["x"].values, result["y"].values)
+    assert distance[-1].min() > 0.01
+    for name in ("x", "y"):
+        values = result[name].values
+        assert (np.abs(values - values[-1]) <= 1e-9 + error + error[-1]).all()
     framed = study.in_frame("minimum-perturbation")
     assert framed.poses("direct", None, [0.5]).shape == (1, 3)
     best = optimise(scene, harmonics=1, limits=1.2)
-    assert best.value > np.hypot(*truth[-1, :2])
-    plots.save(plots.displacement_figure({"circle": result}), tmp_path / "a.png")
-    assert diagnosed_velocity(scene.system, [0.1, 0.2], [1.0, 0.0])["status"] == "exact"
-    assert study.cost([0.3], study.tiers).balances > 0
-
-
-def test_a_function_takes_shapes_and_their_rates():
-    said = r"the velocity of <lambda> must take \(alpha, alphadot\)"
-    with pytest.raises(Refusal, match=said):
-        Scene(lambda alpha: alpha, Circle())
+    assert best.value > distance[-1, -1]
 
 
 GROUPS = [

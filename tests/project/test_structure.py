@@ -2,70 +2,30 @@
 motions alone."""
 
 import ast
-import functools
 import graphlib
-import itertools
 import pathlib
 import re
 import tomllib
 
-import mutants
 import pytest
 
-from geomech.shell import describe
-
 ROOT = pathlib.Path(__file__).parents[2]
-# Beside the systems: commands list the named media and ask a stress map; an intruder
-# has a law, a body and effects but no system; a sweep puts effects side by side; a
-# calibration fits a law; a robot that walks has a map and no system, and a map of
-# stress is written by its coefficients. Workers tell the solver to take one thread, and
-# by which back end. Environments for learning stand on sand, and measured midlines are
-# put into a medium.
-KNOW_MECHANICS = {
-    "gym/hexapod.py",
-    "run/backend.py",
-    "scenes/terradynamics/intruder.py",
-    "scenes/terradynamics/intruding.py",
-    "scenes/terradynamics/solid.py",
-    "scenes/terradynamics/stress.py",
-    "scenes/terradynamics/walker.py",
-    "scenes/write.py",
-    "shell/describe/builtin.py",
-    "shell/describe/grains.py",
-    "shell/describe/system.py",
-    "studies/displacement/batch.py",
-    "studies/grains/drag.py",
-    "studies/grains/swim.py",
-    "studies/measured/midlines/predicted.py",
-    "studies/terradynamics/calibration.py",
-    "studies/terradynamics/stress.py",
-    "studies/terradynamics/stress_calibration.py",
-    "studies/terradynamics/walking.py",
-}
-
-
-@functools.cache
-def nodes(path):
-    """All nodes of the tree of a file."""
-    return [*ast.walk(ast.parse(path.read_text()))]
 
 
 # Of rft the mathematics of a connection knows errors and planar motions alone.
 ABSTRACT = ("rft.core", "rft.formulas.se2")
+PURE = (
+    "geomech.mathematics.gaits",
+    "geomech.mathematics.geometry",
+    "geomech.mathematics.tiers",
+)
 
 
-def test_pure_geometry_knows_planar_motions_alone(imported):
-    users = set()
+def test_the_mathematics_of_gaits_knows_planar_motions_alone(imported):
     for name, others in imported.items():
-        mechanics = {x for x in others if x.startswith("rft")}
-        if name.startswith("geomech") and any(is_mechanics(x) for x in mechanics):
-            users.add(FILES[name].relative_to(ROOT / "geomech").as_posix())
-    others = {x for x in users if not x.startswith("mathematics/systems/")}
-    assert others == KNOW_MECHANICS
-
-
-def is_mechanics(module):
-    return not module.startswith(ABSTRACT)
+        if name.startswith(PURE):
+            mechanics = {x for x in others if x.startswith("rft")}
+            assert mechanics == {x for x in mechanics if x.startswith(ABSTRACT)}, name
 
 
 def modules():
@@ -78,32 +38,27 @@ def modules():
     return found
 
 
-def names_imported(node):
-    """Return dotted names that a node of a syntax tree imports."""
-    match node:
-        case ast.Import(names=names):
-            return [alias.name for alias in names]
-        case ast.ImportFrom(module=module, names=names):
-            return [f"{module}.{alias.name}" for alias in names]
-        case ast.Call(
-            func=ast.Name("import_module") | ast.Attribute(_, "import_module")
-        ):
-            return [x.value for x in node.args if isinstance(x, ast.Constant)]
-    return []
+def statements(node):
+    """Yield the statements below a node, inside functions too, but not those that type
+    checkers alone load."""
+    for inner in ast.iter_child_nodes(node):
+        if isinstance(inner, ast.If) and "TYPE_CHECKING" in ast.dump(inner.test):
+            continue
+        if isinstance(inner, (ast.stmt, ast.excepthandler, ast.match_case)):
+            yield inner
+            yield from statements(inner)
 
 
 def arrows(path, known):
-    """Return the modules that a file imports, inside functions too, but not those that
-    type checkers alone load."""
-    unloaded = set()
-    found = set()
-    for node in nodes(path):
-        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
-            unloaded |= {id(inner) for inner in ast.walk(node)}
-    for node in nodes(path):
-        if id(node) not in unloaded:
-            names = names_imported(node)
-            found |= {x if x in known else x.rpartition(".")[0] for x in names}
+    """Return the modules that a file imports."""
+    text = path.read_text()
+    found = {*re.findall(r'import_module\("([\w.]+)"', text)}
+    for node in statements(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        if isinstance(node, ast.ImportFrom):
+            names = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= {x if x in known else node.module for x in names}
     return found & {*known}
 
 
@@ -142,44 +97,24 @@ def test_modules_import_from_their_own_layer_or_a_lower_one(imported):
         assert not upward, name
 
 
-def test_what_is_said_of_mutants_is_of_files_that_exist():
-    files = [path.relative_to(ROOT).as_posix() for path in FILES.values()]
-    for start in mutants.TABLE["unwatched"]:
-        assert any(file.startswith(start) for file in files), start
-    of_equivalents = {entry["file"] for entry in mutants.TABLE["equivalent"]}
-    assert {*mutants.TABLE["tests"]} | of_equivalents <= {*files}
-    named = {*itertools.chain(*mutants.TABLE["tests"].values())}
-    tests = {p.stem.removeprefix("test_") for p in ROOT.glob("tests/*/test_*.py")}
-    assert named | {*mutants.TABLE["sources"]} <= tests
-
-
-def test_a_command_that_describes_is_the_function_of_its_file():
-    files = {p.stem for p in (ROOT / "geomech" / "shell" / "describe").glob("*.py")}
-    shared = {"__init__", "builtin", "grains", "scene", "system"}
-    assert files == {*describe.SUMMARIES, *shared}
-
-
 SPEAK_OF_OPTIONS = (
     "geomech.questions.shared.base",
     "geomech.questions.shared.loading",
     "geomech.questions.shared.texts",
     "geomech.shell",
 )  # parts of commands alone
+OPTION = re.compile(r"(?<!\w)--[a-z]")
 
 
 def test_what_python_reaches_names_arguments_and_no_options():
     """A refusal marks an argument, which a command spells as its option
     (`geomech.shell.terminal`)."""
-    texts = []
     for name, path in FILES.items():
-        if name.startswith(("figures", *SPEAK_OF_OPTIONS)):
+        text = path.read_text().replace("geomech scenes --show", "")
+        if name.startswith(("figures", *SPEAK_OF_OPTIONS)) or not OPTION.search(text):
             continue
-        prose = {id(node.value) for node in nodes(path) if isinstance(node, ast.Expr)}
-        strings = (node for node in nodes(path) if is_string(node))
-        texts += [node.value for node in strings if id(node) not in prose]
-    options = [text for text in texts if re.search(r"(?<!\w)--[a-z]", text)]
-    assert [x for x in options if "geomech scenes --show" not in x] == []
-
-
-def is_string(node):
-    return isinstance(node, ast.Constant) and isinstance(node.value, str)
+        nodes = [*ast.walk(ast.parse(text))]
+        prose = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
+        for node in nodes:
+            if isinstance(node, ast.Constant) and id(node) not in prose:
+                assert not OPTION.search(str(node.value)), (name, node.value)

@@ -6,6 +6,7 @@ import pkgutil
 from importlib import import_module
 from importlib.util import find_spec
 
+import frozen
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -14,9 +15,7 @@ import geomech
 import rft
 from geomech import Refusal, plots
 from geomech.mathematics.gaits import (
-    Butterfly,
     Circle,
-    Sine,
     Wave,
 )
 from geomech.scenes.parts import as_scene
@@ -81,60 +80,18 @@ def test_what_makes_no_scene_is_refused(parts, says):
         geomech.study(*parts)
 
 
-def test_effects_and_lengths_may_be_lists():
-    parts = SAND, rft.Chain([1, 1, 1])
-    scene = as_scene(*parts, effects=[rft.Transient(0.1)], phases=32)
-    assert scene.system.effects == (rft.Transient(0.1),)
-    assert scene.numerics.phases == 32
-    swimmer = geomech.Swimmer(*parts, [rft.Transient(0.1)])
-    assert (swimmer, hash(swimmer)) == (scene.system, hash(scene.system))
-
-
-@pytest.mark.parametrize("gait", [Circle, Butterfly, Wave, Sine])
-def test_the_first_argument_of_a_gait_is_its_amplitude(gait):
-    assert gait(0.3).amplitude == 0.3
-
-
 def test_a_table_of_displacements_prints_and_plots_itself(study):
     table = study.displacement([0.5, 1.0], "direct")
-    poses = study.tables.poses("direct", amplitudes=[0.5, 1.0])
-    values = [table[name].values[0] for name in ("x", "y", "heading")]
-    assert_allclose(values, poses.T, atol=1e-5)
     assert "displacement per cycle, direct tier" in repr(table)
     ax = table.plot(ax=plots.figure(3.0, 3.0)[1][0, 0])
     assert_allclose(ax.lines[0].get_ydata(), table["net_distance"].values[0])
     assert ax.get_ylabel() == "net distance per cycle (BL)"
-    assert ax.get_xlabel() == "radius of the circle (rad)"
-
-
-def test_tables_are_computed_once(study):
-    fitted = study.tables.fitted
-    again = study.displacement([0.5], ["path"])
-    before = dict(zip(again["part"].values, again["computed_before"].values))
-    assert before["field"] == 1 and study.tables.fitted is fitted
-
-
-def test_displacements_are_those_of_the_gait_where_no_amplitude_is_given(study):
-    amplitude = study.displacement(tiers="direct")["amplitude"].values
-    assert amplitude.tolist() == [study.scene.gait.amplitude]
-
-
-def test_a_tolerance_chooses_the_tier(study):
-    table = study.displacement(0.5, tolerance=1e-2)
-    assert table["x"].error.max() <= 1e-2 and table.sizes["tier"] == 1
-    with pytest.raises(Refusal, match="tolerance chooses the tier: drop tiers"):
-        study.displacement(0.5, "direct", tolerance=1e-2)
 
 
 def test_a_study_draws_and_films(study, tmp_path):
-    _, ((first, second),) = plots.figure(3.0, 3.0, 2)
-    ccf = study.ccf().plot(component="theta", ax=first)
-    assert ccf.get_title().endswith("turning")
-    A = study.connection().plot(component="y", ax=second)
-    assert A.get_title().endswith("sideways")
+    drawn = study.ccf().plot(component="theta", ax=plots.figure(3.0, 3.0)[1][0, 0])
+    assert drawn.get_title().endswith("turning")
     assert study.animate(tmp_path / "a.gif").read_bytes().startswith(b"GIF")
-    with pytest.raises(Refusal, match="component: 'z' is unknown"):
-        study.ccf().plot(component="z")
 
 
 def test_the_best_gait_is_a_scene():
@@ -144,11 +101,15 @@ def test_the_best_gait_is_a_scene():
     assert_allclose(float(moved["net_distance"][0, 0]), float(best["value"]), rtol=1e-6)
 
 
+def test_a_measured_gait_has_its_connection():
+    assert "A" in geomech.fit_gait(frozen.FOLDER / "log.csv", harmonics=1)
+
+
 def test_a_velocity_makes_a_study(study):
     moved = geomech.study(slide, Circle(0.5), **SMALL).displacement(tiers="direct")
     assert_allclose(moved["y"].values, np.pi / 4)
     options = {"limits": 1.0, "harmonics": 1}
-    best = geomech.study(slide, grid=7).optimize("displacement", **options)
+    best = geomech.study(slide, **SMALL).optimize("displacement", **options)
     assert float(best["value"]) == pytest.approx(np.pi, rel=1e-3)
 
 
@@ -160,14 +121,6 @@ def test_a_medium_is_fitted_to_drag(tmp_path):
     assert as_scene(str(tmp_path / "sand.toml"), CHAIN).system.medium == sand
     fit.save(tmp_path / "fit.nc")
     assert geomech.fitted_medium(geomech.load_result(tmp_path / "fit.nc")) == sand
-    with pytest.raises(Refusal, match="this result has no medium"):
-        geomech.fitted_medium(geomech.displacement("three-link-viscous"))
-
-
-@pytest.mark.parametrize("draw", [plots.ccf_map, plots.vector_field])
-def test_a_picture_of_something_else_says_what_it_draws(draw, study):
-    with pytest.raises(Refusal, match=f"{draw.__name__} draws an? .*, got Study"):
-        draw(study)
 
 
 def test_the_examples_of_a_study_run():
@@ -212,26 +165,3 @@ def test_packages_list_their_public_names(name):
     if hasattr(package, "__all__"):
         assert dir(package) == sorted(package.__all__)
         assert all(hasattr(package, x) for x in package.__all__)
-
-
-def four(alpha, alphadot):
-    x = alphadot @ np.array([1.0, 2.0, 3.0, 4.0])
-    return np.stack([x * np.cos(alpha[..., 3]), 0 * x, 0.1 * x], -1)
-
-
-def test_a_velocity_of_four_joints_is_not_taken_for_one_of_two():
-    scene = geomech.study(four, joints=4, phases=16).scene
-    assert (scene.system.joints, scene.gait.joints) == (4, 4)
-
-
-@pytest.mark.parametrize(
-    ("parts", "joints", "said"),
-    [
-        ([four], {}, "takes 4 joints.*joints = 4"),
-        (["three-link-viscous"], {"joints": 2}, "joints"),
-        ([four, Circle()], {"joints": 4}, r"moves 2 joints but .* has 4"),
-    ],
-)
-def test_joints_that_do_not_fit_are_refused(parts, joints, said):
-    with pytest.raises(Refusal, match=said):
-        geomech.study(*parts, **joints)

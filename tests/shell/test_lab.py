@@ -23,8 +23,7 @@ from commands import geomech
 from geomech import lab, scenes
 from geomech.mathematics.gaits import Butterfly, Circle, Points
 from geomech.mathematics.systems.framed import NAME as MINIMUM_PERTURBATION
-from geomech.scenes.write import text_of, without_gait
-from geomech.shell.describe.lab import lines
+from geomech.scenes.write import text_of
 from geomech.studies.maps import charts
 from geomech.studies.maps.lab import GALLERY, Lab
 from geomech.studies.scene_tables import SceneTables
@@ -80,7 +79,7 @@ def test_errors_hold_and_are_not_idle(name):
     study = SceneTables(scene)
     held = []
     ratios = []
-    for gait in charts.loops(chart.axes, 40, seed=11):
+    for gait in charts.loops(chart.axes, 20, seed=11):
         truth = study.poses("direct", gait)
         found = charts.tiers(chart, gait)
         off = {tier: distances(net, truth) for tier, (net, _) in found.items()}
@@ -101,13 +100,6 @@ def test_a_gait_that_is_no_series_is_one_for_the_page():
     )
 
 
-def test_a_loop_that_leaves_the_chart(glass):
-    with pytest.raises(
-        Refusal, match=r"alpha_1 = 2.7 rad lies outside the field's -2.5 to 2.5"
-    ):
-        charts.tiers(glass, Circle(amplitude=2.7))
-
-
 def distances(net, truth):
     x, y, heading = net - truth
     return np.array([np.hypot(x, y), abs(heading)])
@@ -116,18 +108,14 @@ def distances(net, truth):
 @pytest.fixture(scope="module")
 def family():
     scene = scenes.load("three-link-glass").with_numerics(grid=21, harmonics=9)
-    fractions = []
-    lab = Lab((scene,), {"medium.C": [1.0, 1.5, 2.2, 3.0]})
-    found = lab.charts(fractions.append)
-    assert fractions == sorted(fractions) and fractions[-1] == 1.0
-    return found
+    return Lab((scene,), {"medium.C": [1.0, 1.5, 2.2, 3.0]}).charts(
+        lambda fraction: None
+    )
 
 
 def test_a_family_has_the_scene_as_a_member(family):
     (chart,) = family
-    assert (chart.shapes, chart.highest) == (441, 9)
     assert chart.family.values.tolist() == [1.0, 1.5, 1.8, 2.2, 3.0]
-    assert "medium.C: 5 members, interpolated between them to" in lines(family)[1]
     own = charts.tiers(charts.chart(chart.scene), OFF_CENTRE)
     for tier, (net, _) in charts.tiers(chart.member(1.8), OFF_CENTRE).items():
         np.testing.assert_allclose(net, own[tier].net, atol=1e-6)
@@ -139,20 +127,16 @@ def harmonic(chart):
 
 def test_between_members_the_error_says_how_far_off(family):
     (chart,) = family
-    assert chart.member(2.2).between == 0.0
-    assert chart.member(2.6).between == chart.family.error
     medium = dataclasses.replace(chart.scene.system.medium, C=2.6)
     true = harmonic(charts.chart(chart.scene.changed(medium=medium)))
     guess = harmonic(chart.member(2.6))
     assert 1e-7 < distances(true.net, guess.net)[0] < chart.family.error < 1e-3
     assert guess.error[0] > chart.family.error
-    ends = [harmonic(chart.member(value)).net for value in (1.0, 3.0)]
-    assert distances(*ends)[0] > 20 * chart.family.error
 
 
-def test_one_file_without_network_markup_or_repetition(glass):
+def test_one_file_without_network_or_markup(glass):
     """Scripts and styles are those whose hashes the policy allows; the text of a scene
-    is data; equal tables stand once."""
+    is data."""
     name = "</script><img src=x onerror=alert(1)>\u2028'\""
     odd = dataclasses.replace(glass, scene=glass.scene.changed(name=name))
     text = lab.page([glass, odd])
@@ -166,7 +150,6 @@ def test_one_file_without_network_markup_or_repetition(glass):
     assert "://" not in text.replace("http://www.w3.org/2000/svg", "")
     data = json.loads(re.search(r'id="data">(.*?)</script>', text, re.DOTALL)[1])
     assert [s["name"] for s in data["scenes"]] == ["three-link-glass", name]
-    assert len(data["tables"]) == 10  # three of the scene, three and four of its frames
 
 
 @pytest.mark.parametrize(
@@ -262,26 +245,9 @@ def said(browser):
     return text_of_element(browser, "said")
 
 
-def focus(browser, handle):
-    query = f"[data-handle='{handle}']"
-    js(browser, "document.querySelector(arguments[0]).focus()", query)
-
-
 def click(browser, *selectors):
     for selector in selectors:
         js(browser, "document.querySelector(arguments[0]).click()", selector)
-
-
-def press(browser, *keys, held=None):
-    from selenium.webdriver import ActionChains
-
-    chain = ActionChains(browser)
-    if held:
-        chain.key_down(held)
-    chain.send_keys(*keys)
-    if held:
-        chain.key_up(held)
-    chain.perform()
 
 
 def choose_file(browser, name, text=None):
@@ -311,20 +277,22 @@ def test_the_page_computes_what_python_does(opened, page):
     """Loops of all scenes, half of which cross themselves, in both frames, at members
     of a family and between."""
     rng = np.random.default_rng(5)
+    asked = []
+    expected = []
     for name, chart in page[1].items():
         values = [None] if chart.family is None else [1.8, 3.0, 2.45]
-        loops = itertools.product(charts.loops(chart.axes, 25, seed=8), chart.frames)
+        loops = itertools.product(charts.loops(chart.axes, 6, seed=8), chart.frames)
         for k, (gait, frame) in enumerate(loops):
             value = values[k % len(values)]
             member = chart if value is None else chart.member(value)
             size = round(rng.uniform(0.4, 1.0), 3)
             gait = Points(points=gait.points, amplitude=size, reverse=bool(k % 2))
-            loop = gait.points, size, [0, 0], gait.reverse
-            got = js(opened, "lab.predict(...arguments)", name, frame, *loop, value)
-            expected = charts.tiers(member, gait, frame)
-            for tier, numbers in zip(("harmonic", "path", "area"), got):
-                numbers_here = [*expected[tier].net, *expected[tier].error]
-                np.testing.assert_allclose(numbers, numbers_here, rtol=0, atol=1e-6)
+            asked.append([name, frame, gait.points, size, [0, 0], gait.reverse, value])
+            found = charts.tiers(member, gait, frame)
+            tiers = [found[tier] for tier in ("harmonic", "path", "area")]
+            expected.append([[*net, *error] for net, error in tiers])
+    got = js(opened, "arguments[0].map((a) => lab.predict(...a))", asked)
+    np.testing.assert_allclose(got, expected, rtol=0, atol=1e-6)
 
 
 CHOOSE = (
@@ -334,24 +302,12 @@ CHOOSE = (
 
 
 def test_component_frame_and_family_are_chosen(opened):
-    image = "document.querySelector('#map image').getAttribute('href')"
-    first = js(opened, image)
     click(opened, "#component button:nth-child(3)")
     opened.execute_script(CHOOSE, "frame", MINIMUM_PERTURBATION, "change")
     opened.execute_script(CHOOSE, "value", "2.5", "input")
     now = state(opened)
     assert "component=heading" in now
     assert f"frame={MINIMUM_PERTURBATION}&value=2.5" in now
-    assert js(opened, image) != first
-
-
-def test_the_gait_plays_until_it_is_stopped(opened):
-    phase = js(opened, "lab.player.phase")
-    until(lambda: js(opened, "lab.player.phase") != phase)
-    click(opened, "#play")
-    phase = js(opened, "lab.player.phase")
-    time.sleep(0.1)
-    assert js(opened, "lab.player.phase") == phase
 
 
 def test_climbing_goes_further(opened):
@@ -363,12 +319,7 @@ def test_climbing_goes_further(opened):
     assert js(opened, best) == start
 
 
-FAMILY_LOOP = "#scene=three-link-glass&loop=butterfly&amplitude=0.9&centre=0.1,-0.2"
-
-
-@pytest.mark.parametrize(
-    "loop", ["butterfly&reverse=0&value=2.5", "ellipse", "figure-eight", "circle"]
-)
+@pytest.mark.parametrize("loop", ["butterfly&reverse=0&value=2.5", "circle"])
 def test_a_loop_is_saved_and_read_again(opened, page, loop):
     go(opened, f"{page[0]}#loop={loop}&amplitude=0.9&centre=0.1,-0.2")
     before = state(opened)
@@ -382,7 +333,8 @@ def test_a_loop_is_saved_and_read_again(opened, page, loop):
 
 
 def test_predictions_and_pictures_are_saved(opened, page):
-    go(opened, f"{page[0]}{FAMILY_LOOP}&reverse=0&value=2.5")
+    loop = "loop=butterfly&amplitude=0.9&centre=0.1,-0.2&reverse=0&value=2.5"
+    go(opened, f"{page[0]}#scene=three-link-glass&{loop}")
     assert saved(opened, "png").read_bytes().startswith(b"\x89PNG")
     assert "loop=butterfly" in saved(opened, "svg").read_text(encoding="utf-8")
     row = saved(opened, "csv").read_text().splitlines()[2]
@@ -391,7 +343,6 @@ def test_predictions_and_pictures_are_saved(opened, page):
     expected = charts.tiers(member, gait)["harmonic"]
     numbers = [float(x) for x in row.split(",")[1:]]
     np.testing.assert_allclose(numbers, [*expected.net, *expected.error], atol=1e-6)
-    assert "import Butterfly" in text_of_element(opened, "python")
 
 
 @pytest.mark.parametrize(
@@ -442,26 +393,6 @@ def test_a_scene_is_saved_without_its_gait_however_that_is_spelled(glass, spelle
     assert saved == scene.changed(gait=Butterfly())
 
 
-def test_a_scene_is_saved_whose_gait_no_file_can_name(glass):
-    class Own(Circle):
-        pass
-
-    scene = glass.scene.changed(gait=Own(0.5, frequency=2.0))
-    saved = text_of(without_gait(scene) | {"gait": {"kind": "circle"}})
-    assert scenes.parse(saved, scene.name) == scene.changed(gait=Circle())
-
-
-@pytest.mark.parametrize("key", ["medium.C", "medium.gamma0_deg"])
-def test_a_family_of_any_key_is_saved_with_its_value(family, key):
-    medium = "[medium]\nlaw = 'granular'\nC = 1.8\ngamma0_deg = 13\n"
-    scene = scenes.parse(f"{medium}[gait]\nkind = 'circle'\n[body]\nkind = 'chain'\n")
-    changed = dataclasses.replace(family[0].family, key=key)
-    chart = dataclasses.replace(family[0], scene=scene, family=changed)
-    before, after = lab.data([chart])["scenes"][0]["toml"]
-    section, name = key.split(".")
-    assert tomllib.loads(f"{before}1.25{after}")[section][name] == 1.25
-
-
 TOML = (
     *SPELLED,
     "",
@@ -505,22 +436,20 @@ TOML = (
 )
 
 
-READ_TOML = (
-    "try { return JSON.stringify(lab.tables(arguments[0])) }"
-    "catch (error) { return String(error.message) }"
-)
-
-
-OPENED = "try { return lab.opened(arguments[0])[0].loop } catch (error) { return '' }"
+def of_each(browser, expression, texts):
+    """Return an expression of JavaScript in ``text`` for each of some texts; "" where
+    it fails."""
+    told = f"try {{ return {expression} }} catch (error) {{ return '' }}"
+    return js(browser, f"arguments[0].map((text) => {{ {told} }})", texts)
 
 
 def test_the_page_reads_the_toml_that_python_reads(opened):
-    for text in TOML:
-        found = opened.execute_script(READ_TOML, text)
+    read = of_each(opened, "JSON.stringify(lab.tables(text))", TOML)
+    for text, found in zip(TOML, read, strict=True):
         try:
             expected = tomllib.loads(text)
         except (ValueError, RecursionError):
-            assert found.startswith("it is not TOML"), text
+            assert found == "", text
         else:
             assert json.loads(found) == expected, text
 
@@ -559,23 +488,23 @@ VALUES = [
 def test_the_page_takes_and_refuses_what_the_reader_does(opened, kind):
     """Values of every key in turn, of right and of wrong types, within and beyond
     bounds."""
-    good = GOOD.get(kind, {})
-    taken = 0
+    texts = []
     for key, value in itertools.product(KEYS, VALUES):
-        text = text_of({"gait": {"kind": kind, **good, key: value}})
-        expected = is_a_gait(text)
-        assert (opened.execute_script(OPENED, text) != "") == expected, (key, value)
-        taken += expected
-    assert taken > 10
+        gait = {"kind": kind, **GOOD.get(kind, {}), key: value}
+        texts.append(text_of({"gait": gait}))
+    loops = of_each(opened, "lab.opened(text)[0].loop", texts)
+    taken = {text for text, loop in zip(texts, loops, strict=True) if loop}
+    assert taken == {text for text in texts if is_a_gait(text)}
+    assert len(taken) > 10
 
 
-@pytest.mark.parametrize(
-    "filler", ["\n", " ", "\t\n", "#", "a = 1\n#\n", "0", "1_", "a.", "'", "["]
-)
-def test_long_files_are_read_at_once(opened, filler):
+def test_long_files_are_read_at_once(opened):
     """Of a loop after many blank lines, and of texts that are nearly TOML."""
-    text = filler * (60_000 // len(filler)) + "\n[gait]\nkind = 'circle'\n"
-    assert opened.execute_script(OPENED, text) in ("", "circle")
+    texts = []
+    for filler in ("\n", " ", "\t\n", "#", "a = 1\n#\n", "0", "1_", "a.", "'", "["):
+        head = filler * (60_000 // len(filler))
+        texts.append(f"{head}\n[gait]\nkind = 'circle'\n")
+    assert {*of_each(opened, "lab.opened(text)[0].loop", texts)} == {"", "circle"}
 
 
 @pytest.mark.parametrize(
@@ -598,58 +527,8 @@ def test_addresses_that_say_nothing(opened, page, address):
     assert said(opened).startswith("The address is not used") or address.startswith("%")
 
 
-def test_points_at_the_edge_stay_in_the_address(opened, page):
-    """Of a small loop, whose unit curve reaches far."""
-    from selenium.webdriver import Keys
-
-    go(opened, f"{page[0]}#loop=circle&amplitude=0.05&centre=2.3,0")
-    focus(opened, 2)
-    press(opened, *[Keys.ARROW_DOWN] * 30, held=Keys.SHIFT)
-    moved = state(opened)
-    assert points_in(moved)[2][1] == -50
-    until(lambda: opened.current_url.endswith(moved))
-    opened.refresh()
-    assert state(opened) == moved and said(opened) == ""
-
-
-def test_points_that_meet_are_refused_and_leave_nothing_to_undo(opened, page):
-    from selenium.webdriver import Keys
-
-    opened.get(f"{page[0]}#loop=points&points=0,0;0.02,0;0,1&amplitude=1")
-    until(lambda: "0.02,0" in state(opened))
-    before = state(opened)
-    focus(opened, 1)
-    press(opened, Keys.ARROW_LEFT, Keys.DELETE)
-    assert state(opened) == before and "3 to 60 points" in said(opened)
-    click(opened, "#undo")
-    assert "loop=circle" in state(opened)  # before the address was given
-
-
-def test_a_frequency_belongs_to_the_state(opened):
-    first = state(opened)
-    choose_file(opened, "f.toml", "gait = {kind = 'circle', frequency = 0}")
-    still = state(opened)
-    assert still.endswith("&frequency=0")
-    until(lambda: opened.current_url.endswith(still))
-    opened.refresh()
-    assert state(opened) == still
-    assert js(opened, "lab.player.frequency") == 0
-    opened.execute_script("location.hash = arguments[0]", first)
-    until(lambda: state(opened) == first)
-    click(opened, "#undo")
-    assert state(opened) == still
-
-
-def test_another_address_stops_a_climb(opened):
-    click(opened, "#climb")
-    other = "scene=three-link-viscous&loop=circle&amplitude=0.5"
-    opened.execute_script("location.hash = arguments[0]", other)
-    until(lambda: state(opened).startswith(other))
-    assert text_of_element(opened, "climb") == "Climb"
-
-
 def test_a_dragged_point_is_undone_and_redone(opened):
-    from selenium.webdriver import ActionChains, Keys
+    from selenium.webdriver import ActionChains
 
     first = state(opened)
     handle = opened.find_element("css selector", "[data-handle='2'] .hit")
@@ -660,63 +539,32 @@ def test_a_dragged_point_is_undone_and_redone(opened):
     assert x > 0.05 and y > 1.1  # it was at (0, 1), pixels are some 0.01 rad
     click(opened, "#undo")
     assert state(opened) == first
-    press(opened, "y", held=Keys.CONTROL)
+    click(opened, "#redo")
     assert state(opened) == dragged
 
 
-def test_arrows_move_a_point_and_are_undone_at_once(opened):
-    from selenium.webdriver import Keys
-
-    first = state(opened)
-    focus(opened, 1)
-    press(opened, Keys.ARROW_LEFT, Keys.ARROW_LEFT)
-    assert state(opened) != first
-    click(opened, "#undo")
-    assert state(opened) == first
-
-
-def test_points_are_inserted_and_deleted(opened):
+def test_keys_move_insert_and_delete_points(opened):
     from selenium.webdriver import ActionChains, Keys
 
     handles = "document.querySelectorAll('.handle').length"
+    first = state(opened)
+    js(opened, "document.querySelector(\"[data-handle='1']\").focus()")
+    ActionChains(opened).send_keys(Keys.ARROW_LEFT).perform()
+    assert state(opened) != first
     before = js(opened, handles)
-    focus(opened, 1)
-    press(opened, Keys.INSERT)
+    ActionChains(opened).send_keys(Keys.INSERT).perform()
     assert js(opened, handles) == before + 1
-    press(opened, Keys.DELETE)
+    ActionChains(opened).send_keys(Keys.DELETE).perform()
     assert js(opened, handles) == before
-    # A click on the loop inserts one there.
-    x, y = opened.execute_script(
-        "const line = document.querySelector('.target');"
-        "const p = line.getPointAtLength(line.getTotalLength() * .55);"
-        "const box = line.ownerSVGElement.getBoundingClientRect();"
-        "return [box.x + p.x, box.y + p.y]"
-    )
-    pointer = ActionChains(opened, duration=0)
-    pointer.w3c_actions.pointer_action.move_to_location(int(x), int(y)).click()
-    pointer.perform()
-    assert js(opened, handles) == before + 1
 
 
-@pytest.fixture
-def browsed(monkeypatch, tmp_path):
-    """The pages that a browser is asked to open, in a folder that is given."""
-    pages = []
-    monkeypatch.setattr("webbrowser.open", pages.append)
-    (tmp_path / "page").mkdir()
-    monkeypatch.setattr("tempfile.mkdtemp", lambda prefix: str(tmp_path / "page"))
-    return pages
-
-
-def test_without_a_file_a_browser_opens_the_page(browsed, tmp_path):
+def test_without_a_file_a_browser_opens_the_page(monkeypatch, tmp_path):
+    opened = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    monkeypatch.setattr("tempfile.mkdtemp", lambda prefix: str(tmp_path))
     assert geomech("lab", "three-link-viscous")[0] == 0
-    page = tmp_path / "page" / "lab.html"
-    assert browsed == [page.as_uri()] and page.exists()
-
-
-def test_a_refusal_leaves_no_folder_behind(browsed, tmp_path):
-    assert geomech("lab", "no-slip-snake")[0] == 2
-    assert browsed == [] and not (tmp_path / "page").exists()
+    assert opened == [(tmp_path / "lab.html").as_uri()]
+    assert (tmp_path / "lab.html").exists()
 
 
 def test_a_loop_that_leaves_the_map(opened, page):
@@ -739,7 +587,6 @@ def test_controls_have_labels(opened):
 
 def test_the_name_of_a_scene_is_text(opened, page):
     go(opened, f"{page[0]}#scene=%3Cb%20onclick%3Dalert(1)%3E")
-    assert "onclick" in state(opened)
     assert js(opened, "document.querySelectorAll('b').length") == 0
     assert "<b onclick=alert(1)>" in text_of_element(opened, "foot")
 
@@ -762,15 +609,10 @@ def test_what_a_series_leaves_is_summed_along_the_loop():
 
 
 def test_loops_of_a_chart_fill_its_field_and_stay_within():
-    """Curves through three to nine shapes within 0.85 of either side about the
-    middle."""
+
     axes = np.linspace(-1.0, 3.0, 5), np.linspace(-0.5, 0.1, 5)
     loops = charts.loops(axes, 20, seed=3)
-    counts = [len(gait.points) for gait in loops]
-    assert len(counts) == 20 and min(counts) == 3 and 7 <= max(counts) <= 9
-    points = np.concatenate([gait.points for gait in loops])
-    shares = (points - [1.0, -0.2]) / [2.0, 0.3]
-    assert np.abs(shares).max() == pytest.approx(0.85, abs=0.06)
+    assert {len(gait.points) for gait in loops} >= {3, 7}
     curves = np.array([gait.cycle(300)[0] for gait in loops])
     reach = (np.abs(curves - [1.0, -0.2]) / [2.0, 0.3]).max((1, 2))
     assert reach.max() < 1.001 and (reach > 0.9).any()

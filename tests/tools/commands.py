@@ -64,14 +64,13 @@ def geomech(*args, cwd="."):
 @contextlib.contextmanager
 def own_parts():
     """Parts of one's own, and the modules they came in, are forgotten at the end."""
-    before, modules = (
-        {group: dict(registry) for group, registry in REGISTRIES.items()},
-        set(sys.modules),
-    )
+    before = {group: dict(registry) for group, registry in REGISTRIES.items()}
+    modules = set(sys.modules)
     with mock.patch.multiple(kinds, _sources={}, _files={}):
         yield
     for group, registry in REGISTRIES.items():
-        registry.restore(before.get(group, registry))
+        built_in = {name: registry[name] for name in registry.built_in}
+        registry.restore(before.get(group, built_in))
     for name in set(sys.modules) - modules:
         if name.startswith(kinds.PLUGIN):
             del sys.modules[name]

@@ -41,6 +41,7 @@ import geomech
 import rft
 from geomech.io.results import from_dict
 from geomech.mathematics.systems.capabilities import solver_of
+from geomech.questions.shared import names
 from geomech.run import cost
 from geomech.shell import pipeline
 from rft.balance import backend
@@ -96,7 +97,7 @@ def velocities():
 
 
 def tiers():
-    for name in shipped("gait"):
+    for name in names.scene_names():
         scene = geomech.load(name)
         numerics = COARSE
         if not solver_of(scene.system):
@@ -107,14 +108,14 @@ def tiers():
             yield f"tier, {name}, {tier}", study.poses(tier, None, amplitudes)
 
 
-def march(names, cycles=2):
+def march(some, cycles=2):
     """Return net pose, velocities, power and moments of a march under effects that are
     strong enough to matter."""
     body = rft.Chain((1, 1.4, 0.8), frame="link-2")
     gait = geomech.mathematics.gaits.Ellipse(
         semi_axes=(1.0, 0.6), tilt=0.4, centre=(0.3, -0.2)
     )
-    effects = [EFFECTS[name][0](0.05) for name in names]
+    effects = [EFFECTS[name][0](0.05) for name in some]
     options = {**SOLVED, "effects": effects, "cycles": cycles, "with_work": True}
     medium = MEDIA["glass-0.3mm-loose"]
     steps = rft.time_steps(medium, body, *gait.cycle(8), **options)
@@ -142,17 +143,6 @@ def command(*args: str) -> str:
     if code != "0":
         raise RuntimeError(f"geomech {' '.join(args)} ended with {code}: {err}")
     return out
-
-
-def shipped(kind: str) -> list[str]:
-    """Return the names of the scenes that ship: of a "gait", an "intruder" or a
-    "walker"."""
-    sections = command("scenes").split("\n\n")  # each but the first under a heading
-    lines = sections[("gait", "intruder", "walker").index(kind)].splitlines()
-    if kind != "gait":
-        lines = lines[1:]
-    # Lines that begin with a blank go on with a description.
-    return [line.split()[0] for line in lines if not line.startswith(" ")]
 
 
 def digest(values) -> list[float]:
@@ -252,7 +242,7 @@ def walks():
 def intruders():
     """The intruder scenes that ship, of few pieces."""
     with frozen.place() as here:
-        for name in shipped("intruder"):
+        for name in names.intruder_names():
             numerics = "elements = 40"
             if hasattr(geomech.load(name), "mesh"):
                 numerics = "triangles = 400"
@@ -265,7 +255,7 @@ def walkers():
     """The robots that ship, coarsely: a fifth of a second, in few steps."""
     coarse = "[numerics]\nsteps = 8\nelements = 4\nrounding = 0.02\nduration = 0.2\n"
     with frozen.place() as here:
-        for name in shipped("walker"):
+        for name in names.walker_names():
             text = re.sub(r"\[numerics\][^[]*", "", command("scenes", "--show", name))
             (here / "scene.toml").write_text(f"{text}\n{coarse}")
             yield from printed(f"walker, {name}", "walk", "scene.toml", "--yes")
@@ -293,12 +283,13 @@ def measurements():
 # Lines whose costs are known in some hundredths of a second, by what they are about.
 ASKED = {
     "gait": (
+        names.scene_names,
         "displacement {} --amplitudes 0.3,0.9", "ccf {}", "connection {} -o x.nc", "run {} -o d", "lab {} -o x.html",
         "sweep {} --over gait.amplitude=0.3,0.6 -o x.nc", "trajectory {} --cycles 3", "forces {}", "accuracy {}",
         "optimize {} --objective speed", "optimize {} --objective efficiency --starts 3",
     ),
-    "intruder": ("intrude {}", "accuracy {}"),
-    "walker": ("walk {}", "sweep {} --over gait.frequency=1,2 -o x.nc", "accuracy {}"),
+    "intruder": (names.intruder_names, "intrude {}", "accuracy {}"),
+    "walker": (names.walker_names, "walk {}", "sweep {} --over gait.frequency=1,2 -o x.nc", "accuracy {}"),
 }  # fmt: skip
 # Lines whose gaits or falls come first.
 SLOW = (
@@ -315,16 +306,19 @@ def costs():
         told.append(asked)
         asked.check("", False)
 
-    with pytest.MonkeyPatch.context() as patch, backend.preferring("numpy"):
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        backend.preferring("numpy"),
+        frozen.place(),
+    ):
         patch.setattr(pipeline, "decide", refuse)
         patch.setattr(cost, "LONGEST", 0.0)  # nothing is begun
-        for kind, lines in ASKED.items():
-            for name, line in itertools.product(shipped(kind), lines):
+        for kind, (known, *lines) in ASKED.items():
+            for name, line in itertools.product(known(), lines):
                 words = line.format(name)
                 if re.search(SLOW, words):
                     continue
-                with frozen.place():
-                    frozen.geomech(*words.split())
+                frozen.geomech(*words.split())
                 for asked in told:  # none of a scene that is refused
                     numbers = [asked.balances, asked.memory]
                     if kind != "walker":
@@ -391,19 +385,13 @@ def changed(old: dict, new: dict) -> dict[str, float]:
 
 
 def table(old: dict, new: dict) -> str:
-    """Return a line for every entry that changed: its number that moved most, old and
-    new, and the relative change."""
-    lines = [f"{'entry':64} {'old':>22} {'new':>22} {'change':>9}"]
-    for name, x in changed(old, new).items():
-        was, now = (entries.get(name, []) for entries in (old, new))
-        said = [f"{len(was)} numbers", f"{len(now)} numbers"]
-        if len(was) == len(now):
-            most = np.abs(np.subtract(was, now)).argmax()
-            said = [f"{was[most]:.15g}", f"{now[most]:.15g}"]
-        lines.append(f"{name:64} {said[0]:>22} {said[1]:>22} {x:9.1e}")
-    if len(lines) == 1:
-        return f"all {len(new)} entries as recorded, to {TOLERANCE:g}"
-    return "\n".join(lines)
+    """Return a line for every entry that changed, with the relative change of its
+    number that moved most."""
+    lines = [
+        f"{name}: {x:.1e}, {old.get(name)} -> {new.get(name)}"
+        for name, x in changed(old, new).items()
+    ]
+    return "\n".join(lines) or f"all {len(new)} entries as recorded, to {TOLERANCE:g}"
 
 
 def write(old: dict, new: dict) -> None:

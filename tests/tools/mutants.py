@@ -3,8 +3,6 @@ collected by pytest:
 
     python tests/tools/mutants.py calls.txt --measure
     python tests/tools/mutants.py calls.txt --count 200 --seed 1 --jobs 2
-    python tests/tools/mutants.py calls.txt --count 200 --seed 1 --map map.jsonl
-    python tests/tools/mutants.py calls.txt --needed map.jsonl
 
 The first line runs the suite and the examples of docstrings once and notes which
 functions each test calls, and its seconds. A mutant then meets the tests that call the
@@ -18,12 +16,6 @@ only read. A mutant is killed when a test fails; time-outs, far longer than with
 are counted apart. Survivors are printed as what they change.
 `--done 50` goes on with a run that was stopped after 50. `--rooms laws shell` measures
 the tests of these folders of `tests/` alone, for a change of one room.
-
-`--map` lets all tests of a mutant run, not only as far as the first that fails, and
-adds a line for each mutant to a file: what it changes, and which tests notice.
-`--needed` reads such files and prints a set of tests that notices every mutant that any
-test noticed, cheapest first as far as a greedy choice goes, and the tests that it does
-without.
 """
 
 import argparse
@@ -53,8 +45,10 @@ ROOT = Path(__file__).parents[2]
 PACKAGES = "rft/", "geomech/"
 TABLE = tomllib.loads((ROOT / "tests/tools/mutants.toml").read_text())
 # In one process and without time limits of its own, whatever the suite's settings are.
-PYTEST = ["-q", "--doctest-modules", "--assert=plain", "-p", "no:cacheprovider"]
-PYTEST += ["-o", "addopts=", "-o", "timeout=0", "-m", "not soak and not benchmark"]
+PYTEST = [
+    *("-q", "--doctest-modules", "--assert=plain", "-p", "no:cacheprovider"),
+    *("-o", "addopts=", "-o", "timeout=0", "-m", "not soak and not benchmark"),
+]
 # Loaded once, before each mutant's process splits off.
 HEAVY = "pytest numpy scipy.interpolate scipy.special scipy.stats sympy mpmath matplotlib.pyplot xarray"
 CLEAN = {
@@ -64,37 +58,28 @@ CLEAN = {
     "MPLBACKEND": "agg",
 }
 
-SWAPPED = {
-    ast.Add: ast.Sub,
-    ast.Sub: ast.Add,
-    ast.Mult: ast.Div,
-    ast.Div: ast.Mult,
-    ast.Pow: ast.Mult,
+
+def both_ways(pairs):
+    return {**pairs, **{b: a for a, b in pairs.items()}}
+
+
+SWAPPED = both_ways({ast.Add: ast.Sub, ast.Mult: ast.Div, ast.BitAnd: ast.BitOr})
+SWAPPED |= {ast.Pow: ast.Mult, ast.FloorDiv: ast.Mult, ast.Mod: ast.FloorDiv}
+BORDER = both_ways({ast.Lt: ast.LtE, ast.Gt: ast.GtE})
+OPPOSITE = both_ways({
+    ast.Lt: ast.GtE, ast.LtE: ast.Gt, ast.Eq: ast.NotEq, ast.Is: ast.IsNot,
+    ast.In: ast.NotIn,
+})  # fmt: skip
+TWIN = both_ways({
+    "minimum": "maximum", "min": "max", "sin": "cos", "real": "imag", "any": "all",
+    "zeros": "ones", "zeros_like": "ones_like", "floor": "ceil", "sum": "mean",
+    "argmin": "argmax", "exp": "expm1",
+})  # fmt: skip
+# Functions of two arguments that may come in either order.
+EITHER_WAY = {
+    *("max", "min", "maximum", "minimum", "fmax", "fmin", "hypot"),
+    *("distance", "pose_distance", "dot", "plus"),
 }
-SWAPPED |= {
-    ast.FloorDiv: ast.Mult,
-    ast.Mod: ast.FloorDiv,
-    ast.BitAnd: ast.BitOr,
-    ast.BitOr: ast.BitAnd,
-}
-BORDER = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt}
-OPPOSITE = {
-    ast.Lt: ast.GtE,
-    ast.LtE: ast.Gt,
-    ast.Gt: ast.LtE,
-    ast.GtE: ast.Lt,
-    ast.Eq: ast.NotEq,
-    ast.NotEq: ast.Eq,
-}
-OPPOSITE |= {ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn, ast.NotIn: ast.In}
-PAIRS = "minimum maximum, min max, sin cos, real imag, any all, zeros ones, zeros_like ones_like, floor ceil, sum mean"
-TWIN = {
-    p[i]: p[1 - i]
-    for p in map(str.split, (PAIRS + ", argmin argmax, exp expm1").split(","))
-    for i in (0, 1)
-}
-# functions of two arguments
-EITHER_WAY = "max min maximum minimum fmax fmin hypot distance pose_distance dot plus"
 
 
 class Mutant(NamedTuple):
@@ -125,14 +110,9 @@ def variants(node):
             yield with_(op=SWAPPED[type(op)]())
         case ast.Compare(ops=ops):
             for k, op in enumerate(ops):
-                others = [
-                    table[type(op)]()
-                    for table in (BORDER, OPPOSITE)
-                    if type(op) in table
-                ]
-                yield from (
-                    with_(ops=[*ops[:k], other, *ops[k + 1 :]]) for other in others
-                )
+                for table in (BORDER, OPPOSITE):
+                    if type(op) in table:
+                        yield with_(ops=[*ops[:k], table[type(op)](), *ops[k + 1 :]])
         case ast.BoolOp(op=op):
             yield with_(op=ast.And() if isinstance(op, ast.Or) else ast.Or())
         case ast.UnaryOp(op=ast.USub() | ast.Not() | ast.Invert()):
@@ -144,17 +124,12 @@ def variants(node):
         case ast.Attribute(attr=name) if name in TWIN:
             yield with_(attr=TWIN[name])
         case ast.Call(args=args, keywords=given):
-            yield from (
-                with_(keywords=[*given[:k], *given[k + 1 :]]) for k in range(len(given))
-            )
-            either_way = (
-                len(args) == 2
-                and ast.unparse(node.func).rpartition(".")[2] in EITHER_WAY.split()
-            )
-            told_apart = len({*map(ast.dump, args[:2])}) == 2 and not any(
-                isinstance(x, ast.Starred) for x in args[:2]
-            )
-            if told_apart and not either_way:
+            for k in range(len(given)):
+                yield with_(keywords=[*given[:k], *given[k + 1 :]])
+            name = ast.unparse(node.func).rpartition(".")[2]
+            either_way = len(args) == 2 and name in EITHER_WAY
+            first = {ast.dump(x) for x in args[:2] if not isinstance(x, ast.Starred)}
+            if len(first) == 2 and not either_way:
                 yield with_(args=[args[1], args[0], *args[2:]])
         case ast.If(test=test) | ast.IfExp(test=test):
             yield test, ast.UnaryOp(ast.Not(), test)
@@ -173,24 +148,18 @@ def nodes(tree):
     """The nodes of a tree that may be mutated: not texts, annotations, decorators, nor
     what the table says to skip."""
     for field, value in ast.iter_fields(tree):
+        if field in ("annotation", "returns", "decorator_list"):
+            continue
         for node in value if isinstance(value, list) else [value]:
-            plain = isinstance(node, ast.AST) and field not in (
-                "annotation",
-                "returns",
-                "decorator_list",
-            )
-            name = (
-                ast.unparse(node.targets[0])
-                if isinstance(node, ast.Assign)
-                else getattr(node, "name", None)
-            )
-            if (
-                plain
-                and name not in TABLE["skip"]
-                and not isinstance(node, ast.JoinedStr)
-            ):
+            if not isinstance(node, ast.AST) or isinstance(node, ast.JoinedStr):
+                continue
+            name = getattr(node, "name", None)
+            if isinstance(node, ast.Assign):
+                name = ast.unparse(node.targets[0])
+            if name not in TABLE["skip"]:
                 yield node
-                yield from () if isinstance(node, ast.Raise) else nodes(node)
+                if not isinstance(node, ast.Raise):
+                    yield from nodes(node)
 
 
 def scopes(node, name=""):
@@ -209,26 +178,22 @@ def scopes(node, name=""):
 
 
 def mutants_of(path: Path) -> list[Mutant]:
-    file, text = path.relative_to(ROOT).as_posix(), path.read_bytes()
+    text = path.read_bytes()
     starts = [0, *(i + 1 for i, byte in enumerate(text) if byte == 10)]
-    tree, found = ast.parse(text), {}
+    tree = ast.parse(text)
     around = list(scopes(tree))
+    found = {}
     for part, new in (v for node in nodes(tree) for v in variants(node)):
-        low, high = (
-            starts[part.lineno - 1] + part.col_offset,
-            starts[part.end_lineno - 1] + part.end_col_offset,
-        )
+        low = starts[part.lineno - 1] + part.col_offset
+        high = starts[part.end_lineno - 1] + part.end_col_offset
         code = ast.unparse(ast.fix_missing_locations(new))
-        bare = isinstance(new, (ast.stmt, ast.Name)) or (
-            isinstance(new, ast.Constant) and "-" not in code
-        )
-        mutated = (
-            text[:low] + (code if bare else f"({code})").encode() + text[high:]
-        ).decode()
-        scope = [name for first, last, name in around if first <= part.lineno <= last][
-            -1
-        ]
-        found[mutated] = Mutant(file, part.lineno, scope, text.decode(), mutated)
+        if not isinstance(new, (ast.stmt, ast.Name, ast.Constant)) or "-" in code:
+            code = f"({code})"
+        mutated = (text[:low] + code.encode() + text[high:]).decode()
+        line = part.lineno
+        scope = [name for first, last, name in around if first <= line <= last][-1]
+        file = path.relative_to(ROOT).as_posix()
+        found[mutated] = Mutant(file, line, scope, text.decode(), mutated)
     return list(found.values())
 
 
@@ -245,10 +210,13 @@ class Calls:
     functions of the project it calls."""
 
     def __init__(self, tree: Path, file: Path):
-        self.tree, self.file = f"{tree}/", file
+        self.tree = f"{tree}/"
+        self.file = file
 
     def pytest_runtest_logstart(self, nodeid):
-        self.codes, self.failed, self.start = {}, False, sum(os.times()[:4])
+        self.codes = {}
+        self.failed = False
+        self.start = sum(os.times()[:4])
         threading.settrace(self.note)
         sys.settrace(self.note)
 
@@ -261,51 +229,33 @@ class Calls:
     def pytest_runtest_logfinish(self, nodeid):
         sys.settrace(None)
         threading.settrace(None)
+        seconds = round(sum(os.times()[:4]) - self.start, 3)
         calls = set()
         for code in self.codes.values():
-            if (
-                code.co_filename.startswith(self.tree)
-                and code.co_flags & inspect.CO_OPTIMIZED
-            ):  # no class, no module
-                name = code.co_qualname.partition(".<locals>.<")[
-                    0
-                ]  # what is around a lambda
-                calls.add(f"{code.co_filename.removeprefix(self.tree)}.{name}")
-        calls = sorted(x for x in calls if x.startswith(PACKAGES))
+            name = code.co_filename.removeprefix(self.tree)
+            # Neither classes nor modules; of a lambda what is around it.
+            if name.startswith(PACKAGES) and code.co_flags & inspect.CO_OPTIMIZED:
+                calls.add(f"{name}.{code.co_qualname.partition('.<locals>.<')[0]}")
         if not self.failed:
             with self.file.open("a") as file:
-                print(
-                    json.dumps(
-                        [nodeid, round(sum(os.times()[:4]) - self.start, 3), calls]
-                    ),
-                    file=file,
-                )
+                print(json.dumps([nodeid, seconds, sorted(calls)]), file=file)
 
 
 class Watch:
     """The tests that watch a mutant, from a file that `Calls` wrote."""
 
-    def __init__(self, file: Path, enough: float = 60.0):
-        """``enough`` is the CPU time in s that the tests of one mutant may take."""
+    def __init__(self, file: Path, enough: float, tests: set[str]):
+        """``enough`` is the CPU time in s that the tests of one mutant may take, and
+        ``tests`` are those that there are."""
         self.enough = enough
         self.seconds = {}  # by test
         self.calling = collections.defaultdict(set)  # tests by place
         for line in file.open():
-            test, self.seconds[test], calls = json.loads(line)
-            for place in {place for call in calls for place in outwards(call)}:
-                self.calling[place].add(test)
-
-    def keep(self, tests: set[str]) -> int:
-        """Forget all tests but these, and return how many are forgotten."""
-        gone = self.seconds.keys() - tests
-        for test in gone:
-            del self.seconds[test]
-        self.calling = {
-            place: calling - gone
-            for place, calling in self.calling.items()
-            if calling - gone
-        }
-        return len(gone)
+            test, seconds, calls = json.loads(line)
+            if test in tests:
+                self.seconds[test] = seconds
+                for place in {place for call in calls for place in outwards(call)}:
+                    self.calling[place].add(test)
 
     def over(self, m: Mutant) -> list[str]:
         """The tests to be run on a mutant, file by file, the quickest first."""
@@ -314,11 +264,12 @@ class Watch:
         else:
             places = outwards(f"{m.file}.{m.scope}".rstrip("."))
             near = next((self.calling[x] for x in places if x in self.calling), set())
-        files, some, sums = {file_of(test) for test in near}, [], collections.Counter()
-        every = (test for test in self.seconds if file_of(test) in files)
-        for test in sorted(
-            every, key=lambda test: (test not in near, self.seconds[test])
-        ):
+        files = {file_of(test) for test in near}
+        every = [test for test in self.seconds if file_of(test) in files]
+        every.sort(key=lambda test: (test not in near, self.seconds[test]))
+        some = []
+        sums = collections.Counter()
+        for test in every:
             if sums.total() < self.enough:
                 some.append(test)
                 sums[file_of(test)] += self.seconds[test]
@@ -337,15 +288,10 @@ def file_of(test: str) -> str:
 
 
 def start(
-    tree: Path,
-    tests: list[str],
-    seconds: float,
-    *options: str,
-    plugins=(),
-    until_end: bool = False,
+    tree: Path, tests: list[str], seconds: float, *options: str, plugins=()
 ) -> int:
     """The id of a new process that runs some tests in a copy of the tree, with so much
-    CPU time at most: up to the first file in which one fails, or all of them."""
+    CPU time at most, up to the first file in which one fails."""
     if child := os.fork():
         return child
     try:
@@ -356,14 +302,12 @@ def start(
         os.dup2(1, 2)
         os.chdir(tree)
         os.environ["PYTHONPATH"] = sys.path[0] = str(tree)
-        worst = 0
         for _, some in itertools.groupby(tests, file_of):  # each is read in its turn
             arguments = [*PYTEST, *options, *some]
             status = importlib.import_module("pytest").main(arguments, plugins)
-            worst = worst or status
-            if worst and not until_end:
-                break
-        os._exit(worst)
+            if status:
+                os._exit(status)
+        os._exit(0)
     finally:
         os._exit(1)
 
@@ -392,46 +336,6 @@ class Listed:
                 print(item.nodeid, file=file)
 
 
-class Failures:
-    """A plugin of pytest that writes which tests fail."""
-
-    def __init__(self, file: Path):
-        self.file = file
-
-    def pytest_runtest_logreport(self, report):
-        if report.failed:
-            with self.file.open("a") as file:
-                print(report.nodeid, file=file)
-
-
-def needed(files: list[Path], watch: Watch) -> None:
-    """Print tests that notice all mutants of some maps together, and those that are not
-    needed for it."""
-    noticed = {}
-    for file in files:
-        for line in file.open():
-            change, tests = json.loads(line)
-            if tests:
-                noticed[change] = {*tests}
-    every = {test for tests in noticed.values() for test in tests}
-    left, chosen = {*noticed}, []
-    while left:
-        gain = {
-            test: sum(test in noticed[change] for change in left)
-            / (0.01 + watch.seconds.get(test, 0.0))
-            for test in every
-        }
-        best = max(gain, key=gain.get)
-        chosen.append(best)
-        left -= {change for change in left if best in noticed[change]}
-        every.discard(best)
-    print(f"{len(noticed)} mutants are noticed by {len(chosen)} tests:")
-    print(*chosen, sep="\n")
-    rest = sorted({*watch.seconds} - {*chosen})
-    print(f"\n{len(rest)} tests are not needed for it:")
-    print(*rest, sep="\n")
-
-
 def measure(file: Path, folder: Path, rooms: list[str]) -> None:
     """Write what each test calls, with a process for each file of tests."""
     tree = copied(folder / "0")
@@ -453,46 +357,34 @@ def measure(file: Path, folder: Path, rooms: list[str]) -> None:
         )
 
 
+def there_are(tree: Path) -> set[str]:
+    """The tests of a copy of the tree."""
+    listed = Listed(tree / "tests.txt")
+    some = ["tests", *PACKAGES]
+    os.waitpid(start(tree, some, 600, "--collect-only", plugins=[listed]), 0)
+    return {*listed.file.read_text().splitlines()}
+
+
 def hunted(
-    some: list[Mutant], watch: Watch, folder: Path, jobs: int, map_file: Path | None
+    some: list[Mutant], asked: argparse.Namespace, folder: Path
 ) -> Iterator[tuple[Mutant, str]]:
     """Each with "survived", "killed" or "time-out", so many at a time, each in a copy
     of the tree below ``folder``."""
-    trees, running, todo = (
-        [copied(folder / str(k)) for k in range(jobs)],
-        {},
-        iter(some),
-    )
-    listed = Listed(folder / "tests.txt")
-    child = start(
-        trees[0], ["tests", *PACKAGES], 600, "--collect-only", plugins=[listed]
-    )
-    os.waitpid(child, 0)
-    gone = watch.keep({*listed.file.read_text().splitlines()})
-    if gone:
-        print(f"{gone} of the tests measured are gone", flush=True)
+    trees = [copied(folder / str(k)) for k in range(asked.jobs)]
+    watch = Watch(asked.calls, asked.enough, there_are(trees[0]))
+    running = {}
+    todo = iter(some)
     while (m := next(todo, None)) or running:
         if m:
             tree, tests = trees.pop(), watch.over(m)
             (tree / m.file).write_text(m.mutated)
             seconds = 30 + 3 * sum(watch.seconds[x] for x in tests)
-            if map_file:
-                (tree / "failed.txt").write_text("")
-                failures = Failures(tree / "failed.txt")
-                child = start(tree, tests, seconds, plugins=[failures], until_end=True)
-            else:
-                child = start(tree, tests, seconds, "-x")
-            running[child] = m, tree
+            running[start(tree, tests, seconds, "-x")] = m, tree
         if not trees or not m:
             child, status = os.wait()
             done, tree = running.pop(child)
             (tree / done.file).write_text(done.source)
             trees.append(tree)
-            if map_file:
-                failed = sorted({*(tree / "failed.txt").read_text().splitlines()})
-                change = f"{done.file}:{done.line}\n{done.change()}"
-                with map_file.open("a") as file:
-                    print(json.dumps([change, failed]), file=file)
             late = os.WIFSIGNALED(status) and os.WTERMSIG(status) in (
                 signal.SIGKILL,
                 signal.SIGXCPU,
@@ -502,38 +394,26 @@ def hunted(
 
 
 def report(asked: argparse.Namespace, folder: Path) -> None:
-    files = sorted(
-        p.relative_to(ROOT).as_posix()
-        for top in PACKAGES
-        for p in (ROOT / top).rglob("*.py")
-    )
-    files = [
-        f
-        for f in files
-        if f.startswith(tuple(asked.only))
-        and not f.startswith(tuple(TABLE["unwatched"]))
-    ]
-    every = [m for f in files for m in mutants_of(ROOT / f)]
-    some = random.Random(asked.seed).sample(every, min(asked.count, len(every)))[
-        asked.done :
-    ]
+    every = []
+    for path in sorted(p for top in PACKAGES for p in (ROOT / top).rglob("*.py")):
+        file = path.relative_to(ROOT).as_posix()
+        unwatched = file.startswith(tuple(TABLE["unwatched"]))
+        if file.startswith(tuple(asked.only)) and not unwatched:
+            every += mutants_of(path)
+    count = min(asked.count, len(every))
+    some = random.Random(asked.seed).sample(every, count)[asked.done :]
     print(f"{len(some)} of {len(every)} mutants, seed {asked.seed}", flush=True)
-    known = {
-        (x["file"], x["change"].strip()): x["why"] for x in TABLE.get("equivalent", ())
-    }
+    known = {(x["file"], x["change"].strip()): x["why"] for x in TABLE["equivalent"]}
     counts = collections.Counter()
-    watch = Watch(asked.calls, asked.enough)
-    for m, outcome in hunted(some, watch, folder, asked.jobs, asked.map):
-        why = known.get((m.file, m.change())) if outcome == "survived" else None
-        counts["no bug" if why else outcome] += 1
-        more = (
-            f" no bug: {why}"
-            if why
-            else f"\n{m.change()}"
-            if outcome == "survived"
-            else ""
-        )
-        print(f"{outcome:8} {m.file}:{m.line}{more}", flush=True)
+    for m, outcome in hunted(some, asked, folder):
+        more = ""
+        if outcome == "survived":
+            more = m.change()
+            if (m.file, more) in known:
+                outcome = "no bug"
+                more = known[m.file, more]
+        counts[outcome] += 1
+        print(f"{outcome:8} {m.file}:{m.line}\n{more}".rstrip(), flush=True)
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     told = ", ".join(f"{count} {outcome}" for outcome, count in sorted(counts.items()))
     print(f"\n{told}; {(used.ru_utime + used.ru_stime) / 60:.1f} minutes of CPU")
@@ -563,12 +443,7 @@ def main() -> None:
         help="CPU time in s that the tests of one mutant may take",
     )
     ask.add_argument("--rooms", nargs="+", default=[], help="folders of tests/")
-    ask.add_argument("--map", type=Path, help="add which tests notice each mutant")
-    ask.add_argument("--needed", nargs="+", type=Path, help="read such maps")
     asked = ask.parse_args()
-    if asked.needed:
-        needed(asked.needed, Watch(asked.calls))
-        return
     os.environ.update(CLEAN)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # clean up then too
     for name in HEAVY.split():

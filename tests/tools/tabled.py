@@ -32,13 +32,7 @@ def tabled(result):
     for name in (*QUANTITIES, "speed", "speed_body_lengths", "turning_rate"):
         if name in result:
             found[name] = by_tier(result[name].values)
-    for name in ("efficiency", "cost_of_transport"):
-        if name in result:
-            found[name] = by_tier(result[name].values)
-    for name in ("path_length", "work"):
-        if name in result:
-            found[name] = result[name].values.tolist()
-            found[f"{name}_error"] = result[name].error.tolist()
+
     if "tolerance" in result.attributes:
         (found["tier"],) = tiers
         settings = [name for name in result if name.startswith("chosen_")]
@@ -49,16 +43,10 @@ def tabled(result):
         if name in result:
             rows = by_tier(result[name].values)
             found[name] = {t: x for t, x in rows.items() if not np.isnan(x).any()}
-    if result["x"].spread is not None:
-        found["medium_error_of"] = {q: result[q].spread[0].tolist() for q in QUANTITIES}
-        both = np.hypot(result["x"].spread, result["y"].spread)
-        found["medium_error"] = by_tier(both)
-        found["medium_error_heading"] = by_tier(result["heading"].spread)
+
     if "seconds" in result:
         parts = result["part"].values.tolist()
         found["seconds"] = dict(zip(parts, result["seconds"].values.tolist()))
-        before = result["computed_before"].values
-        found["kept"] = [part for part, was in zip(parts, before) if was]
     return found
 
 
@@ -75,10 +63,6 @@ def swept_table(result):
         found["displacement"] = np.stack(poses, -1)
         found["estimate"] = result["net_distance"].error
         found["estimate_heading"] = result["heading"].error
-        if result["x"].spread is not None:
-            both = np.hypot(result["x"].spread, result["y"].spread)
-            found["medium_error"] = both
-            found["medium_error_heading"] = result["heading"].spread
     else:
         found["estimate"] = result["speed"].error
     return found

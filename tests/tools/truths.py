@@ -11,6 +11,7 @@ import dataclasses
 import hashlib
 import json
 import pathlib
+import warnings
 from collections.abc import Callable, Mapping
 
 import numpy as np
@@ -33,11 +34,9 @@ def spelled(value) -> str:
             return spelled(sorted(value.items()))
         case _ if dataclasses.is_dataclass(value):
             fields = {f.name: getattr(value, f.name) for f in dataclasses.fields(value)}
-            fields = {
-                name: x
-                for name, x in fields.items()
-                if x is not None or name not in LATER
-            }
+            for name in LATER & fields.keys():
+                if fields[name] is None:
+                    del fields[name]
             return type(value).__name__ + spelled(fields)
         case str() | int() | None:
             return repr(value)
@@ -51,8 +50,10 @@ class Truths:
     files by them."""
 
     def __init__(self, renew: bool = False, folder: pathlib.Path = DATA):
-        self.renew, self.folder, self.kept, self.asked = renew, folder, {}, {}
-        self.missing = []  # names of files that had no answer
+        self.renew = renew
+        self.folder = folder
+        self.kept = {}
+        self.asked = {}
 
     def __call__(self, name: str, compute: Callable, *question) -> np.ndarray:
         """The answer kept in ``name``.json for the question; ``compute(*question)`` if
@@ -62,7 +63,8 @@ class Truths:
         if key not in asked:
             kept = None if self.renew else self._read(name).get(key)
             if kept is None and not self.renew:
-                self.missing.append(name)
+                said = f"{name}.json lacks an answer: pytest --renew-truths"
+                warnings.warn(said, stacklevel=2)
             asked[key] = np.array(compute(*question) if kept is None else kept)
         return asked[key].copy()
 
@@ -73,8 +75,9 @@ class Truths:
         return self.kept[name]
 
     def write(self) -> None:
-        """Files of the names asked for, one line an answer."""
-        self.folder.mkdir(exist_ok=True)
+        """Files of the names asked for, one line an answer, where they are renewed."""
+        if not self.renew:
+            return
         for name, answers in self.asked.items():
             rows = [
                 f'"{key}": {json.dumps(answer.round(DECIMALS).tolist())}'

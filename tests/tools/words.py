@@ -91,10 +91,10 @@ def numbers(text: str) -> list[tuple[float, float]]:
     their order."""
     found = []
     for word in WORD.findall(text):
-        if (x := number_of(word)) is not None:
-            digits, _, power = (
-                word.rstrip(".%?!").removesuffix("deg").lower().partition("e")
-            )
+        x = number_of(word)
+        if x is not None:
+            bare = word.rstrip(".%?!").removesuffix("deg").lower()
+            digits, _, power = bare.partition("e")
             decimals = len(digits.partition(".")[2])
             found.append((x, 10.0 ** (int(power or 0) - decimals) if decimals else 0.0))
     return found
@@ -205,19 +205,23 @@ def is_array(value: list) -> bool:
 
 def of_text(name: str, text: str) -> Iterator[str]:
     """An attribute: a scene in TOML by its keys, other text as it is."""
-    try:
-        yield from (
-            f"= {line}" for line in flat(tomllib.loads(text), name) if "\n" in text
-        )
-    except tomllib.TOMLDecodeError:
-        yield f"~ {name} = {' '.join(text.split())}"
-    else:
-        if "\n" not in text:
-            yield f"~ {name} = {text}"
+    with contextlib.suppress(tomllib.TOMLDecodeError):
+        if "\n" in text:
+            yield from (f"= {line}" for line in flat(tomllib.loads(text), name))
+            return
+    yield f"~ {name} = {' '.join(text.split())}"
 
 
 def decoded(x):
     return x.decode() if isinstance(x, bytes) else x
+
+
+PICTURES = {
+    b"\x89PNG\r\n": "PNG",
+    b"GIF89a": "GIF",
+    b"%PDF-1": "PDF",
+    b"<?xml ": "XML",
+}
 
 
 def of_netcdf(file: pathlib.Path) -> Iterator[str]:
@@ -226,12 +230,11 @@ def of_netcdf(file: pathlib.Path) -> Iterator[str]:
             yield from of_text(f":{key}", masked(short(decoded(data._attributes[key]))))
         for name in sorted(data.variables):
             variable = data.variables[name]
-            yield (
-                f"= {name}({', '.join(f'{d} {n}' for d, n in zip(variable.dimensions, variable.shape))}) "
-                + (
-                    f"{variable.data.dtype.kind}{variable.data.dtype.itemsize} in {decoded(getattr(variable, 'units', b'-'))}"
-                )
-            )
+            sizes = zip(variable.dimensions, variable.shape)
+            told = ", ".join(f"{dim} {size}" for dim, size in sizes)
+            kind = f"{variable.data.dtype.kind}{variable.data.dtype.itemsize}"
+            unit = decoded(getattr(variable, "units", b"-"))
+            yield f"= {name}({told}) {kind} in {unit}"
             for key in sorted(set(variable._attributes) - {"units"}):
                 yield f"~ {name}:{key} = {decoded(variable._attributes[key])}"
             text = variable.data.dtype.kind == "S"
@@ -253,39 +256,20 @@ def of_file(file: pathlib.Path) -> Iterator[str]:
             for key, value in sorted(loadmat(file).items()):
                 if not key.startswith("__"):
                     yield f"= {key} {value.dtype.kind}{value.dtype.itemsize} = {of_array(value)}"
-        case ".toml":
-            yield from (
-                f"= {line}" for line in flat(tomllib.loads(masked(file.read_text())))
-            )
-        case ".json":
-            yield from (
-                f"= {line}" for line in flat(json.loads(masked(file.read_text())))
-            )
+        case ".toml" | ".json":
+            read = tomllib.loads if file.suffix == ".toml" else json.loads
+            yield from (f"= {line}" for line in flat(read(masked(file.read_text()))))
         case ".csv":
-            rows = [
-                line
-                for line in file.read_text().splitlines()
-                if not line.startswith("#")
-            ]
-            yield f"= {len(rows)} lines of {rows[0]}"
+            lines = file.read_text().splitlines()
+            head, *rows = [line.split(",") for line in lines if line[:1] != "#"]
+            yield f"= {len(rows) + 1} lines of {','.join(head)}"
             with contextlib.suppress(ValueError):
-                for name, column in zip(
-                    rows[0].split(","),
-                    np.array([row.split(",") for row in rows[1:]], float).T,
-                ):
+                for name, column in zip(head, np.array(rows, float).T):
                     yield f"= {name} = {of_array(column)}"
         case ".html":  # test_lab.py opens it
             yield f"= {file.read_text().splitlines()[0]}"
         case ".png" | ".gif" | ".pdf" | ".svg":
-            begin = file.read_bytes()[:6]
-            kinds = {
-                b"\x89PNG\r\n": "PNG",
-                b"GIF89a": "GIF",
-                b"%PDF-1": "PDF",
-                b"<?xml ": "XML",
-            }
-            yield f"= {kinds.get(begin, 'something else')}"
+            yield f"= {PICTURES.get(file.read_bytes()[:6], 'something else')}"
         case _:
-            yield from (
-                f"~ {line}" for line in masked(file.read_text()).splitlines() if line
-            )
+            lines = masked(file.read_text()).splitlines()
+            yield from (f"~ {line}" for line in lines if line)
