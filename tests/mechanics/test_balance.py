@@ -5,12 +5,8 @@ import pytest
 from registry import DRY, MEDIA
 
 from geomech.mathematics import symbolic
-from rft import (
-    Chain,
-    Viscous,
-    body_velocity,
-)
-from rft.balance import backend
+from rft import Chain, EndCaps, Viscous, body_velocity
+from rft.balance import backend, velocity
 from rft.formulas.newton import plus, to_element, to_frame
 from rft.laws.base import TermLaw
 
@@ -134,3 +130,18 @@ def test_yield_stress_and_viscosity_together(speed, loads, rtol):
     loads = (mean_t[:, None], mean_n[:, None], turning[:, None])
     net = [np.sum(motion.weight * f) for f in to_frame(motion, *loads)]
     assert np.abs(net).max() < rtol * (1 + speed)
+
+
+def test_large_batches_are_solved_in_parts(monkeypatch):
+    """With a radius of its own and a start for each sample."""
+    rng = np.random.default_rng(7)
+    alpha = rng.uniform(-1.5, 1.5, (2, 30, 2))
+    caps = EndCaps(radius=0.05).with_parameters(radius=rng.uniform(0.01, 0.1, 60))
+    motion = GLASS, Chain(), alpha, rng.normal(size=(2, 30, 2))
+    whole = body_velocity(*motion, effects=(caps,))
+    monkeypatch.setattr(velocity, "SAMPLES_TOGETHER", 13)
+    start = np.where(rng.random((2, 30, 1)) < 0.5, whole.xi, np.nan)
+    for more in ({}, {"start": start}):
+        parts = body_velocity(*motion, effects=(caps,), **more)
+        np.testing.assert_allclose(parts.xi, whole.xi, rtol=0, atol=1e-9)
+        assert (parts.status == whole.status).all()

@@ -12,6 +12,7 @@ from commands import geomech
 import rft
 from geomech.shell import cli
 from geomech.studies.estimates import effort
+from rft.balance.velocity import UNCONVERGED
 
 SMALL = """[medium]\nname = "glass-0.3mm-loose"\n[body]\nkind = "chain"\nlengths = [1, 1.4, 0.8]\n
 [gait]\nkind = "ellipse"\nsemi_axes = [0.8, 0.5]\n[numerics]\ngrid = 7\nphases = 32\nharmonics = 5\nextent = 2.0\n"""
@@ -80,7 +81,7 @@ def test_what_does_not_converge_ends_with_2(name, ended, monkeypatch):
 
     def unconverged(*args, **kwargs):
         found = solve(*args, **kwargs)
-        return found._replace(status=np.full(found.status.shape, "unconverged"))
+        return found._replace(code=np.full(found.code.shape, UNCONVERGED))
 
     monkeypatch.setattr(rft, "body_velocity", unconverged)
     code, out, err, files = ended(name)
