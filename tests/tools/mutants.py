@@ -3,6 +3,8 @@ collected by pytest:
 
     python tests/tools/mutants.py calls.txt --measure
     python tests/tools/mutants.py calls.txt --count 200 --seed 1 --jobs 2
+    python tests/tools/mutants.py calls.txt --count 200 --seed 1 --map map.jsonl
+    python tests/tools/mutants.py calls.txt --needed map.jsonl
 
 The first line runs the suite and the examples of docstrings once and notes which
 functions each test calls, and its seconds. A mutant then meets the tests that call the
@@ -16,6 +18,12 @@ only read. A mutant is killed when a test fails; time-outs, far longer than with
 are counted apart. Survivors are printed as what they change.
 `--done 50` goes on with a run that was stopped after 50. `--rooms laws shell` measures
 the tests of these folders of `tests/` alone, for a change of one room.
+
+`--map` runs all tests of a mutant, not only as far as the first that fails, and adds a
+line for each mutant to a file: what it changes, and which tests notice. `--needed`
+reads such files and prints a set of tests that notices every mutant that any test
+noticed, cheapest first as far as a greedy choice goes, and the tests that it does
+without.
 """
 
 import argparse
@@ -288,10 +296,15 @@ def file_of(test: str) -> str:
 
 
 def start(
-    tree: Path, tests: list[str], seconds: float, *options: str, plugins=()
+    tree: Path,
+    tests: list[str],
+    seconds: float,
+    *options: str,
+    plugins=(),
+    until_end: bool = False,
 ) -> int:
     """The id of a new process that runs some tests in a copy of the tree, with so much
-    CPU time at most, up to the first file in which one fails."""
+    CPU time at most, up to the first file in which one fails, or all of them."""
     if child := os.fork():
         return child
     try:
@@ -302,12 +315,14 @@ def start(
         os.dup2(1, 2)
         os.chdir(tree)
         os.environ["PYTHONPATH"] = sys.path[0] = str(tree)
+        worst = 0
         for _, some in itertools.groupby(tests, file_of):  # each is read in its turn
             arguments = [*PYTEST, *options, *some]
             status = importlib.import_module("pytest").main(arguments, plugins)
-            if status:
-                os._exit(status)
-        os._exit(0)
+            worst = worst or status
+            if worst and not until_end:
+                break
+        os._exit(worst)
     finally:
         os._exit(1)
 
@@ -357,6 +372,61 @@ def measure(file: Path, folder: Path, rooms: list[str]) -> None:
         )
 
 
+class Failures(Listed):
+    """A plugin of pytest that writes which tests fail."""
+
+    def pytest_runtest_logreport(self, report):
+        if report.failed:
+            with self.file.open("a") as file:
+                print(report.nodeid, file=file)
+
+    def pytest_collection_modifyitems(self, items):
+        pass
+
+
+def started(tree: Path, tests: list[str], seconds: float, map_file: Path | None) -> int:
+    """The id of a new process that runs the tests of a mutant: all of them for a
+    map."""
+    if map_file is None:
+        return start(tree, tests, seconds, "-x")
+    failures = Failures(tree / "failed.txt")
+    return start(tree, tests, seconds, plugins=[failures], until_end=True)
+
+
+def record(m: Mutant, tree: Path, map_file: Path) -> None:
+    """Add the tests that notice a mutant to a map."""
+    failed = sorted({*(tree / "failed.txt").read_text().splitlines()})
+    with map_file.open("a") as file:
+        print(json.dumps([f"{m.file}:{m.line}\n{m.change()}", failed]), file=file)
+
+
+def needed(maps: list[Path], calls: Path) -> None:
+    """Print tests that notice all mutants of some maps together, and those that are not
+    needed for it."""
+    seconds = {}
+    for line in calls.open():
+        test, seconds[test], _ = json.loads(line)
+    noticed = {}
+    for line in (line for path in maps for line in path.open()):
+        change, tests = json.loads(line)
+        if tests:
+            noticed[change] = {*tests}
+    left = {*noticed}
+    chosen = []
+    while left:
+        gain = collections.Counter()
+        for test in (test for change in left for test in noticed[change]):
+            gain[test] += 1 / (0.01 + seconds.get(test, 0.0))
+        best = max(gain, key=gain.get)
+        chosen.append(best)
+        left -= {change for change in left if best in noticed[change]}
+    print(
+        f"{len(noticed)} mutants are noticed by {len(chosen)} tests:", *chosen, sep="\n"
+    )
+    rest = sorted(seconds.keys() - {*chosen})
+    print(f"\n{len(rest)} tests are not needed for it:", *rest, sep="\n")
+
+
 def there_are(tree: Path) -> set[str]:
     """The tests of a copy of the tree."""
     listed = Listed(tree / "tests.txt")
@@ -379,11 +449,13 @@ def hunted(
             tree, tests = trees.pop(), watch.over(m)
             (tree / m.file).write_text(m.mutated)
             seconds = 30 + 3 * sum(watch.seconds[x] for x in tests)
-            running[start(tree, tests, seconds, "-x")] = m, tree
+            running[started(tree, tests, seconds, asked.map)] = m, tree
         if not trees or not m:
             child, status = os.wait()
             done, tree = running.pop(child)
             (tree / done.file).write_text(done.source)
+            if asked.map:
+                record(done, tree, asked.map)
             trees.append(tree)
             late = os.WIFSIGNALED(status) and os.WTERMSIG(status) in (
                 signal.SIGKILL,
@@ -443,7 +515,12 @@ def main() -> None:
         help="CPU time in s that the tests of one mutant may take",
     )
     ask.add_argument("--rooms", nargs="+", default=[], help="folders of tests/")
+    ask.add_argument("--map", type=Path, help="add which tests notice each mutant")
+    ask.add_argument("--needed", nargs="+", type=Path, help="read such maps")
     asked = ask.parse_args()
+    if asked.needed:
+        needed(asked.needed, asked.calls)
+        return
     os.environ.update(CLEAN)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # clean up then too
     for name in HEAVY.split():
