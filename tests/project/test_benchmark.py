@@ -13,12 +13,8 @@ import numpy as np
 import pytest
 from quadruped import STANCE, quadruped
 
-from figures.accuracy.cost_scaling import (
-    NAMES,
-    backends,
-    one_scipy_solve,
-    shortest_time,
-)
+from figures import peers
+from figures.accuracy.cost_scaling import NAMES, backends, shortest_time
 from geomech.mathematics.gaits import Butterfly, Circle, Sine
 from geomech.mathematics.geometry import connection
 from geomech.mathematics.systems import Solver, Swimmer
@@ -57,7 +53,7 @@ def in_turn(asked: dict, rounds: int = 5) -> dict[str, float]:
 
 
 def one_by_one(alpha, alphadot):
-    return [one_scipy_solve(*pair) for pair in zip(alpha, alphadot)]
+    return [peers.one_scipy_solve(*pair) for pair in zip(alpha, alphadot)]
 
 
 def repeated(f, gait):
@@ -87,6 +83,11 @@ def test_against_a_loop_of_fsolve():
     traits = Swimmer(GLASS, MIDDLE).traits
     asked = {"loop": loop}
     samples = {"loop": len(some)}
+    if "numba" in backends():
+        asked["plain compiled loop"] = functools.partial(
+            peers.plain_loop(), alpha, alphadot
+        )
+        samples["plain compiled loop"] = len(alpha)
     for how in backends():
         for threads in {1, os.cpu_count()}:
             name = f"field, {NAMES[how]}, {threads} cores"
@@ -111,6 +112,10 @@ def test_against_a_loop_of_fsolve():
     assert each["loop"] > 50 * each["field, NumPy, 1 cores"]
     answers = loop()
     solution = body_velocity(GLASS, MIDDLE, alpha, alphadot)
+    if "numba" in backends():
+        assert each["plain compiled loop"] > 3 * each["whole field, compiled, 1 cores"]
+        plain = peers.plain_loop()(alpha, alphadot)
+        np.testing.assert_allclose(plain, solution.xi, rtol=0, atol=1e-6)
     failed = np.mean([answer[2] != 1 for answer in answers])
     off = np.abs([answer[0] for answer in answers] - solution.xi[some]).max(-1)
     print(f"  the loop says that it fails in {failed:.0%}", end=", ")
