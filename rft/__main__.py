@@ -72,7 +72,7 @@ def compile_mujoco(law: Extruded | Spatial) -> None:
 def report_cache() -> None:
     """Print where the compiled code is stored."""
     # Only after the check: the import loads numba.
-    from rft.balance.compiled import kernel
+    from rft.balance.kernels import kernel
 
     path = kernel(type(record(LAW)))._cache.path
     if path.exists():

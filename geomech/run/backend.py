@@ -10,7 +10,7 @@ from contextvars import ContextVar
 from geomech.core import version
 from rft import SOLVER
 from rft.balance import backend
-from rft.balance.backend import prefer, preferred, preferring
+from rft.balance.backend import at_once, prefer, preferred, preferring
 from rft.balance.listening import listen, listener, no_listener
 from rft.core.threads import cores, one_thread
 
@@ -18,6 +18,7 @@ __all__ = [
     "BACKENDS",
     "VERSION",
     "at_most",
+    "at_once",
     "cores",
     "fastest",
     "listen",
@@ -32,7 +33,7 @@ __all__ = [
 ]
 
 VERSION = f"geomech {version.VERSION}, solver {SOLVER}"
-BACKENDS = ("numpy", "numba")  # slowest first
+BACKENDS = ("numpy", "built", "numba")  # slowest first
 # Seconds of balances by NumPy, as `geomech.run.cost` assumes them, about as long as
 # compiled code takes to load.
 WORTH_LOADING = 1.5

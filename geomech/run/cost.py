@@ -32,9 +32,10 @@ LOADING = 20.0
 # Assumed seconds, for each place of the body where forces are evaluated. Measured with
 # the work around a balance: 2e-6 to 5e-6 by NumPy and 0.3e-6 to 1.2e-6 compiled in dry
 # media, 0.8e-6 and 0.5e-6 in a linear one, whose bodies were small.
-BALANCE = {"numpy": 5e-6, "numba": 0.8e-6}
+BALANCE = {"numpy": 5e-6, "built": 0.8e-6, "numba": 0.8e-6}
 LINEAR = 0.1  # times BALANCE, in a linear medium
-BATCH = {"numpy": 2e-3, "numba": 5e-4}  # s for each batch of balances, however small
+# s for each batch of balances, however small
+BATCH = {"numpy": 2e-3, "built": 5e-4, "numba": 5e-4}
 
 
 class TooLong(Refusal):

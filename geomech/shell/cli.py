@@ -122,11 +122,11 @@ def geomech(
     plugin: PluginOption = None,
 ):
     """Geometric mechanics of locomotion: from a force law to displacement."""
-    from geomech.run.backend import prefer
+    from geomech.run.backend import at_once, prefer
 
     # NumPy's first call takes half a second less; the pipeline knows who has much to
     # do.
-    prefer("numpy")
+    prefer(at_once())
     load_plugins(plugin)
 
 

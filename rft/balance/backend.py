@@ -1,9 +1,10 @@
 """The choice of the driver that solves balances of forces: compiled code, or NumPy by
 the same formulas.
 
-"auto" is compiled code where numba is installed, else NumPy. A caller with little to
-compute may prefer NumPy, whose first call takes half a second less (`preferring`).
-Neither a clock nor the state of a cache decides. `python -m rft` compiles
+"auto" is compiled code where numba is installed, or where kernels were built ahead of
+time (`rft.balance.ahead`), else NumPy. A caller with little to compute may prefer what
+needs no loading (`preferring`, `at_once`): numba takes half a second. Neither a clock
+nor the state of a cache decides. `python -m rft` compiles
 beforehand."""
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import importlib.util
 from collections.abc import Iterator
 from contextvars import ContextVar
 
+from rft.balance import ahead
 from rft.core.refusal import Refusal, require
 from rft.laws.records import is_compilable
 
@@ -30,7 +32,7 @@ def check(backend: str) -> None:
     if not (isinstance(backend, str) and backend in BACKENDS):
         raise Refusal(f"backend must be one of {', '.join(BACKENDS)}", value=backend)
     require(
-        backend != "numba" or installed(),
+        backend != "numba" or fastest() != "numpy",
         "backend = 'numba' takes numba",
         instead="pip install 'geomech[fast]', or take 'auto'",
     )
@@ -60,10 +62,16 @@ def prefer(backend: str) -> None:
     _preferred.set(backend)
 
 
+def at_once() -> str:
+    """Return the fastest back end that needs no loading: "built", which solves balances
+    by kernels where there are some and else by NumPy, or "numpy"."""
+    return "numpy" if ahead.library() is None else "built"
+
+
 def fastest() -> str:
     """Return the fastest back end for many balances: "numba" where it is installed,
-    else "numpy"."""
-    return "numba" if installed() else "numpy"
+    else `at_once`."""
+    return "numba" if installed() else at_once()
 
 
 def preferred() -> str:
@@ -72,8 +80,17 @@ def preferred() -> str:
 
 
 def compiles(backend: str, law) -> bool:
-    """Return whether compiled code solves the balances of a law, given by its
-    record."""
+    """Return whether numba compiles what is computed by a law, given by its record."""
     if backend == "auto":
         backend = preferred()
     return backend == "numba" and installed() and is_compilable(law)
+
+
+def solves_compiled(backend: str, law) -> bool:
+    """Return whether compiled code solves the balances of a law, given by its record:
+    that of numba, or kernels built ahead of time."""
+    if backend == "auto":
+        backend = preferred()
+    if backend != "numpy" and ahead.has(type(law)):
+        return True
+    return compiles(backend, law)

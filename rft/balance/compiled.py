@@ -1,83 +1,20 @@
-"""The compiled driver: a vector holds one element of eight samples, or, where samples
-are few, eight elements of one.
-
-A sample that has ended gives its place to the next, so that no sample waits for the
-slowest. Elements are summed in their order either way, so that the digits of a sample
-do not depend on the others. A kernel is compiled once for each class of law records,
-from the formulas of `rft.formulas.link`, `rft.formulas.newton` and the law. Importing
-this module loads numba.
-"""
+"""The compiled driver: problems as arguments of kernels, which are built ahead of time
+for closed laws where a wheel brings them, and compiled by numba else."""
 
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
-from numba.extending import register_jitable
 
-from rft.balance.cache import cached
-from rft.bodies.base import Elements
+from rft.balance import ahead
 from rft.effects.contact import NO_FACTOR, Problem, mapped
-from rft.formulas.link import Factor, Incline, Memory, point_load, side_load
 from rft.formulas.momentum import frame_inertia
-from rft.formulas.newton import (
-    RESULT_ROWS,
-    Descent,
-    Frame,
-    Inertia,
-    Iterate,
-    Limits,
-    Net,
-    element_net,
-    first_iterate,
-    newton_step,
-    plus,
-    result,
-    to_element,
-    with_momentum,
-)
-from rft.formulas.simd import (
-    WIDTH,
-    add_lanes,
-    add_vector,
-    any_of,
-    load,
-    record_access,
-    register_formulas,
-    store,
-)
-from rft.formulas.vectors import absolute, minimum, where
+from rft.formulas.newton import RESULT_ROWS, Descent, Limits, Net, with_momentum
 
-# First rows of the records of an element.
-ELEMENTS = 0  # `Elements`
-FACTOR = 9  # `Factor`
-QUADRATIC = 12  # quadratic drag
-MEMORY = 13  # `Memory`
-INCLINE = 23  # `Incline`
-ROWS = 28  # number of rows
-
-# First rows of the records of a sample.
-ITERATE = 0  # `Iterate`
-FRAME = 13  # `Frame`
-SPEED = 17  # scale of speed
-MASS = 18  # `Inertia`
-SAMPLE_ROWS = 31  # number of rows
-
-# Rows of sums: `Net`, then the square of the slowest speed.
-SLOWEST2 = 15
-SUM_ROWS = 16
-
-WEIGHT = 5  # place in `Elements`
-V_T = 6  # place in `Elements`
-SPEED_SCALE = 3  # place in `Frame`
-ROUNDING_NEXT = 7  # place in `Iterate`
-(read_elements, _), (read_factor, _), (read_memory, _), (read_incline, _) = map(
-    record_access, (Elements, Factor, Memory, Incline)
-)
-(read_iterate, write_iterate), (read_frame, _), (read_mass, _) = map(
-    record_access, (Iterate, Frame, Inertia)
-)
+NET_ROWS = 15  # of the sums of forces: the numbers of a `Net`
 DOUBLE = np.dtype(float)
 NO_GUESS = np.zeros((3, 0))
 NO_ROWS = np.zeros((0, 1, 1))
@@ -85,277 +22,25 @@ NO_POINTS = np.zeros((9, 0, 1))
 NO_TERMS = np.zeros((0, 0, 3))
 
 
-@register_jitable(forceinline=True)
-def fill(rows, first, record, e, lane, i):
-    """Write element e and sample i of a record's arrays to a lane; a single row or
-    column stands for all, and the last element for those after it."""
-    for j in range(len(record)):
-        x = record[j]
-        rows[first + j, lane] = x[min(e, x.shape[0] - 1), min(i, x.shape[1] - 1)]
+class Kernels(NamedTuple):
+    """Compiled functions for one class of law records: the solver, and the sum of
+    forces at given velocities (`rft.balance.kernels`)."""
 
-
-@register_jitable
-def ceil_divide(a, b):
-    """Return a / b, rounded up."""
-    return -(-a // b)
-
-
-@register_jitable
-def fill_contact(rows, contact, count, first, last, i):
-    """Write the elements of sample i in one contact to the lanes from first to last of
-    the rows of vectors, ``count`` elements to a vector; elements in excess have no
-    weight."""
-    elements, factors, ground, incline = contact
-    for k in range(len(rows)):
-        for lane in range(first, last):
-            e = k * count + (lane - first) % count
-            fill(rows[k], ELEMENTS, elements, e, lane, i)
-            fill(rows[k], FACTOR, factors, e, lane, i)
-            fill(rows[k], QUADRATIC, ground, e, lane, i)
-            fill(rows[k], INCLINE, incline, e, lane, i)
-            if e >= len(elements[0]) or lane - first >= count:
-                rows[k, ELEMENTS + WEIGHT, lane] = 0.0
-
-
-@register_jitable(forceinline=True)
-def add_triple(sums, first, triple, by_elements):
-    """Add a triple of vectors to three rows of sums: lane by lane, or, by elements, all
-    lanes in turn to the first."""
-    for j in range(3):
-        if by_elements:
-            add_lanes(sums, first + j, triple[j])
-        else:
-            add_vector(sums, first + j, triple[j])
-
-
-@register_jitable(forceinline=True)
-def net_of(sums):
-    """Return the `Net` in the rows of sums."""
-    return Net(
-        (load(sums, 0), load(sums, 1), load(sums, 2)),
-        (load(sums, 3), load(sums, 4), load(sums, 5)),
-        (load(sums, 6), load(sums, 7), load(sums, 8)),
-        (load(sums, 9), load(sums, 10), load(sums, 11)),
-        (load(sums, 12), load(sums, 13), load(sums, 14)),
-    )
+    solve: Callable
+    net_at: Callable
 
 
 @functools.cache
-def evaluator(Law: type):
-    """Return the compiled sum of forces for one class of law records."""
-    register_formulas()
+def kernels_of(Law: type) -> Kernels:
+    """Return the kernels for one class of law records; where they are not built yet,
+    numba is loaded, and compiles each when it is called first."""
+    if ahead.has(Law):
+        built = ahead.library()
+        return Kernels(built.solve, built.net_at)
 
-    @njit(nogil=True, error_model="numpy", forceinline=True)
-    def evaluate(
-        law,
-        point_terms,
-        n_sides,
-        rows,
-        v,
-        v_next,
-        iterate,
-        speed,
-        additions,
-        by_elements,
-        sums,
-    ):
-        """Compute the `Net` on the frame after the next step, and the square of the
-        slowest element's speed, as the rows of ``sums``; write the velocities of
-        elements after that step to v_next.
+    from rft.balance import kernels
 
-        n_sides: number of vectors of elements of the sides; those of the points
-        follow."""
-        rounding = iterate.rounding_next * speed
-        slowest2 = 0.0 * speed + np.inf
-        sums[:] = 0.0
-        for k in range(len(v)):
-            element = read_elements(rows[k], ELEMENTS)
-            due_to_frame = to_element(element, iterate.dx, iterate.dy, iterate.dtheta)
-            u = plus((load(v[k], 0), load(v[k], 1), load(v[k], 2)), due_to_frame)
-            store(v_next[k], 0, u[0])
-            store(v_next[k], 1, u[1])
-            store(v_next[k], 2, u[2])
-            scaled = speed * u[0], speed * u[1], speed * u[2]
-            factor = read_factor(rows[k], FACTOR)
-            incline = read_incline(rows[k], INCLINE)
-            if k < n_sides:
-                quadratic = load(rows[k], QUADRATIC)
-                memory = read_memory(rows[k], MEMORY)
-                f = side_load(
-                    law, scaled, rounding, factor, incline, quadratic, memory, additions
-                )
-            else:
-                f = point_load(
-                    point_terms[k - n_sides],
-                    scaled,
-                    rounding,
-                    factor,
-                    incline,
-                    additions,
-                )
-            net = element_net(element, f, u, speed)
-            across = absolute(u[1]) + absolute(u[2])
-            slowest2 = minimum(slowest2, u[0] * u[0] + across * across)
-            add_triple(sums, 0, net.force, by_elements)
-            add_triple(sums, 3, net.by_x, by_elements)
-            add_triple(sums, 6, net.by_y, by_elements)
-            add_triple(sums, 9, net.by_theta, by_elements)
-            add_triple(sums, 12, net.by_speed, by_elements)
-        store(sums, SLOWEST2, slowest2)
-        if by_elements:
-            for j in range(SLOWEST2):
-                sums[j] = sums[j, 0]
-            sums[SLOWEST2] = sums[SLOWEST2].min()
-
-    return evaluate
-
-
-@functools.cache
-def kernel(Law: type):
-    """Return the compiled solver for one class of law records."""
-    evaluate = evaluator(Law)
-
-    @njit(nogil=True, error_model="numpy")
-    def solve(loads, mass, guess, descent, limits, out):
-        numbers, sides, points, point_terms, frame, additions = loads
-        law = Law(*numbers)
-        size = out.shape[1]
-        n = len(sides[0][0])
-        m = points[0].shape[1]
-        vectors_by_elements = size * (ceil_divide(n, WIDTH) + m)
-        vectors_by_samples = ceil_divide(size, WIDTH) * (n + m)
-        by_elements = vectors_by_elements < vectors_by_samples
-        # slots: samples at once. count: elements of one sample in a vector.
-        slots = 1 if by_elements else WIDTH
-        count = WIDTH if by_elements else 1
-        n_sides = ceil_divide(n, count)
-        rows = np.ones((n_sides + m, ROWS, WIDTH))
-        v = np.zeros((len(rows), 3, WIDTH))
-        v_next = np.zeros((len(rows), 3, WIDTH))
-        samples = np.ones((SAMPLE_ROWS, WIDTH))
-        sums = np.zeros((SUM_ROWS, WIDTH))
-        results = np.zeros((RESULT_ROWS + 1, WIDTH))
-        sample_of_slot = np.full(slots, -1)
-        fresh = guess.shape[1] == 0
-        next_sample = 0
-        n_ended = 0
-        while n_ended < size:
-            for slot in range(slots):
-                if sample_of_slot[slot] < 0 and next_sample < size:
-                    i = next_sample
-                    end = WIDTH if by_elements else slot + 1
-                    fill_contact(rows[:n_sides], sides, count, slot, end, i)
-                    fill_contact(rows[n_sides:], points, 1, slot, end, i)
-                    if fresh:
-                        first = first_iterate(0.0, 0.0, 0.0, descent.first, 1.0)
-                    else:
-                        first = first_iterate(
-                            guess[0, i], guess[1, i], guess[2, i], descent.first, 0.0
-                        )
-                    for lane in range(slot, end):
-                        for k in range(len(rows)):
-                            for j in range(3):
-                                v[k, j, lane] = (
-                                    rows[k, ELEMENTS + V_T + j, lane]
-                                    / frame[SPEED_SCALE][0, i]
-                                )
-                        fill(samples, FRAME, frame, 0, lane, i)
-                        fill(samples, MASS, mass, 0, lane, i)
-                        for j in range(len(first)):
-                            samples[ITERATE + j, lane] = first[j]
-                    sample_of_slot[slot] = i
-                    next_sample += 1
-            iterate = read_iterate(samples, ITERATE)
-            speed = load(samples, SPEED)
-            evaluate(
-                law,
-                point_terms,
-                n_sides,
-                rows,
-                v,
-                v_next,
-                iterate,
-                speed,
-                additions,
-                by_elements,
-                sums,
-            )
-            net = net_of(sums)
-            if additions.momentum:
-                x = iterate.x + iterate.dx
-                y = iterate.y + iterate.dy
-                theta = iterate.theta + iterate.dtheta
-                net = with_momentum(net, x, y, theta, read_mass(samples, MASS), speed)
-            slowest2 = load(sums, SLOWEST2)
-            scales = read_frame(samples, FRAME)
-            iterate, accepted, finished = newton_step(
-                iterate, net, slowest2, scales, descent, limits
-            )
-            write_iterate(samples, ITERATE, iterate)
-            for k in range(len(rows)):
-                for j in range(3):
-                    store(v[k], j, where(accepted, load(v_next[k], j), load(v[k], j)))
-            if any_of(finished):
-                ended = result(iterate, limits)
-                for j in range(RESULT_ROWS):
-                    store(results, j, ended[j])
-                store(results, RESULT_ROWS, where(finished, 1.0, 0.0))
-                for slot in range(slots):
-                    i = sample_of_slot[slot]
-                    if i >= 0 and results[RESULT_ROWS, slot] > 0.0:
-                        for j in range(RESULT_ROWS):
-                            out[j, i] = results[j, slot]
-                        sample_of_slot[slot] = -1
-                        n_ended += 1
-
-    return cached(solve, f"the force balance for laws of the form {Law.__name__}")
-
-
-@functools.cache
-def net_kernel(Law: type):
-    """Return the compiled sum of forces at given velocities of all elements, for one
-    class of law records."""
-    evaluate = evaluator(Law)
-
-    @njit(nogil=True, error_model="numpy")
-    def net_at(loads, v, rounding, out):
-        numbers, sides, points, point_terms, frame, additions = loads
-        law = Law(*numbers)
-        n = len(sides[0][0])
-        size = v.shape[2]
-        rows = np.ones((v.shape[1], ROWS, WIDTH))
-        v_lanes = np.zeros((v.shape[1], 3, WIDTH))
-        v_next = np.zeros_like(v_lanes)
-        samples = np.zeros((SAMPLE_ROWS, WIDTH))
-        sums = np.zeros((SUM_ROWS, WIDTH))
-        samples[SPEED] = 1.0
-        for first in range(0, size, WIDTH):
-            count = min(WIDTH, size - first)
-            for lane in range(count):
-                i = first + lane
-                fill_contact(rows[:n], sides, 1, lane, lane + 1, i)
-                fill_contact(rows[n:], points, 1, lane, lane + 1, i)
-                fill(samples, FRAME, frame, 0, lane, i)
-                samples[ITERATE + ROUNDING_NEXT, lane] = rounding[i]
-                v_lanes[:, :, lane] = v[:, :, i].T
-            iterate = read_iterate(samples, ITERATE)
-            speed = load(samples, SPEED)
-            evaluate(
-                law,
-                point_terms,
-                n,
-                rows,
-                v_lanes,
-                v_next,
-                iterate,
-                speed,
-                additions,
-                False,
-                sums,
-            )
-            out[:, first : first + count] = sums[:SLOWEST2, :count]
-
-    return cached(net_at, f"walks along solutions for laws of the form {Law.__name__}")
+    return Kernels(kernels.kernel(Law), kernels.net_kernel(Law))
 
 
 def plain(x) -> np.ndarray:
@@ -426,8 +111,8 @@ def nets(
 ) -> np.ndarray:
     """Return the entries of `Net` as `rft.balance.arrays.nets` does."""
     p = problem
-    out = np.empty((SLOWEST2, problem.n_samples))
-    net_kernel(type(p.law))(load_arguments(p), plain(v), rounding, out)
+    out = np.empty((NET_ROWS, problem.n_samples))
+    kernels_of(type(p.law)).net_at(load_arguments(p), plain(v), rounding, out)
     out = out.reshape(5, 3, -1)
     if p.momentum_rate is None:
         return out
@@ -448,5 +133,6 @@ def solve(
     if guess is None:
         guess = NO_GUESS
     guess = plain(guess)
-    kernel(type(p.law))(load_arguments(p), mass, guess, descent, limits, out)
+    arguments = load_arguments(p)
+    kernels_of(type(p.law)).solve(arguments, mass, guess, descent, limits, out)
     return out

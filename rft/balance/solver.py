@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.balance import arrays
-from rft.balance.backend import compiles
+from rft.balance.backend import solves_compiled
 from rft.balance.listening import listener
 from rft.balance.path import follow
 from rft.core.threads import keep_freed_memory, run_shares, split, thread_count
@@ -90,7 +90,7 @@ def solve(
     batch = max(1, ELEMENTS_TOGETHER // assembly.n_law_points)
     driver = arrays
     worth = 2 * batch  # samples that pay for a thread
-    if compiles(backend, assembly.law):
+    if solves_compiled(backend, assembly.law):
         driver = compiled_driver()
         worth = COMPILED_WORTH
         batch = 4 * batch
@@ -161,7 +161,7 @@ def solve(
 
 @functools.cache
 def compiled_driver() -> ModuleType:
-    """Return the module of the compiled driver, whose import loads numba."""
+    """Return the module of the compiled driver."""
     from rft.balance import compiled
 
     return compiled

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
+from rft.balance import ahead
 from rft.balance.backend import check, installed
 from rft.bodies.pieces import PIECES
 from rft.core.checks import Number, check_numbers
 from rft.effects.contact import MOST_PIECES
 from rft.formulas.quadrature import parse
+from rft.laws.records import is_compilable
 
 
 @dataclass(frozen=True)
@@ -70,17 +72,19 @@ class Solver:
         check(self.backend)
         check_numbers(self)
 
-    def computed(self, compilable: bool, law: str) -> str:
+    def computed(self, law_record: Any, law: str) -> str:
         """Return the back end in words, and why it is not compiled code.
 
-        compilable: whether compiled code has the law of that name."""
+        law_record: of the law of that name."""
         if self.backend == "numpy":
             return "NumPy, as asked for"
-        if not compilable:
+        if not is_compilable(law_record):
             return (
                 f"NumPy: compiled code does not know the law {law}, whose traction is"
                 " no formula"
             )
+        if ahead.has(type(law_record)):
+            return "compiled code"
         if not installed():
             return "NumPy: numba is not installed (pip install 'geomech[fast]')"
         if self.backend == "numba":

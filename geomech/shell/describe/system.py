@@ -20,7 +20,7 @@ from rft.effects import engine as engine_of
 from rft.effects.base import Effect
 from rft.formulas.quadrature import QUADRATURE
 from rft.laws import LAWS
-from rft.laws.records import is_compilable, record
+from rft.laws.records import record
 
 NO_PREMISE_BROKEN = "nothing remembers, places are alike, no mass"
 
@@ -93,11 +93,11 @@ def swimmer_lines(system: Swimmer) -> list[str]:
         lines += effect_lines(effect, system)
     used = {effect.kind for effect in system.effects}
     off = [name for name in EFFECTS if name not in used]
-    compilable = is_compilable(record(system.medium, system.solver.loads))
+    law_record = record(system.medium, system.solver.loads)
     return [
         *lines,
         f"off, not evaluated: {', '.join(off) or 'none'}",
-        f"back end: {system.solver.computed(compilable, law)}",
+        f"back end: {system.solver.computed(law_record, law)}",
     ]
 
 

@@ -1,0 +1,69 @@
+"""Builds the kernels of balances ahead of time into a wheel, where GEOMECH_KERNELS is
+set: a hook of hatchling, which needs numba, setuptools and a C compiler.
+
+The wheel is then one of this platform and this version of Python, for processors with
+the instructions of x86-64-v3; others take NumPy or numba (`rft.balance.ahead`)."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+import tempfile
+import warnings
+from pathlib import Path
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+NAME = "_kernels"
+PROCESSOR = "x86-64-v3"
+
+
+class Kernels(BuildHookInterface):
+    """The hook: adds `rft/balance/_kernels` to the wheel."""
+
+    PLUGIN_NAME = "custom"
+
+    def initialize(self, version: str, build_data: dict) -> None:
+        if self.target_name != "wheel" or not os.environ.get("GEOMECH_KERNELS"):
+            return
+        self.folder = tempfile.TemporaryDirectory()
+        built = build(Path(self.folder.name), Path(self.root))
+        build_data["pure_python"] = False
+        build_data["infer_tag"] = True
+        build_data["force_include"][str(built)] = f"rft/balance/{built.name}"
+
+    def finalize(self, version: str, build_data: dict, artifact_path: str) -> None:
+        if hasattr(self, "folder"):
+            self.folder.cleanup()
+
+
+def build(folder: Path, root: Path) -> Path:
+    """Compile the kernels of laws in closed form into a module in a folder, and return
+    its file. root: the checkout."""
+    sys.path.insert(0, str(root))
+    os.environ.setdefault("NUMBA_CACHE_DIR", str(folder))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that numba may replace pycc one day
+        from numba.pycc import CC
+    from rft import Chain, Granular, body_velocity
+    from rft.balance import kernels
+    from rft.laws.records import Terms
+
+    # Kernels know their types once they are called; solutions of this law fold at this
+    # shape, so that both are.
+    law = Granular(8.0, math.radians(35.0))
+    shape = (-1.47053323, -1.9356507)
+    rate = (-0.99735926, -0.07262584)
+    body_velocity(law, Chain(), shape, rate, backend="numba")
+    code = CC(NAME)
+    code.output_dir = str(folder)
+    code.target_cpu = PROCESSOR
+    for name, kernel in (
+        ("solve", kernels.kernel(Terms)),
+        ("net_at", kernels.net_kernel(Terms)),
+    ):
+        code.export(name, kernel.signatures[0])(kernel.py_func)
+    code.compile()
+    (file,) = folder.glob(f"{NAME}.*")
+    return file

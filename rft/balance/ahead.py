@@ -1,0 +1,40 @@
+"""Kernels that were built ahead of time, for laws in closed form.
+
+A wheel that is built with them (`.ci/release`) solves balances at compiled speed
+without numba. They are for processors with the instructions AVX2 and FMA
+(x86-64-v3)."""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import importlib.util
+from types import ModuleType
+
+from rft.laws.records import Terms
+
+NAME = "rft.balance._kernels"
+INSTRUCTIONS = ("AVX2", "FMA3")
+
+
+@functools.cache
+def library() -> ModuleType | None:
+    """Return the module of kernels; None if there is none for this processor."""
+    if importlib.util.find_spec(NAME) is None or not _can_run():
+        return None
+    return importlib.import_module(NAME)
+
+
+def has(Law: type) -> bool:
+    """Return whether there are kernels for a class of law records."""
+    return Law is Terms and library() is not None
+
+
+def _can_run() -> bool:
+    """Return whether the processor has the instructions, as NumPy found out."""
+    for name in ("numpy._core", "numpy.core"):  # of NumPy 2, and 1
+        if importlib.util.find_spec(name) is not None:
+            core = importlib.import_module(f"{name}._multiarray_umath")
+            found = getattr(core, "__cpu_features__", {})
+            return all(found.get(x, False) for x in INSTRUCTIONS)
+    return False
