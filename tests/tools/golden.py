@@ -322,7 +322,7 @@ def costs():
                 for asked in told:  # none of a scene that is refused
                     numbers = [asked.balances, asked.memory]
                     if kind != "walker":
-                        numbers += [asked.seconds, asked.besides, asked.steps]
+                        numbers += [asked.seconds, asked.besides, asked.numpy_seconds]
                     yield f"cost, {words}", numbers
                 told.clear()
 
