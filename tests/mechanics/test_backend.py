@@ -36,7 +36,7 @@ from rft import (
     body_velocity,
     time_steps,
 )
-from rft.balance import backend
+from rft.balance import ahead, backend
 from rft.balance import solver as balance
 from rft.balance.backend import Note
 from rft.bodies import Elements
@@ -182,6 +182,7 @@ class Sheared:
 
 def test_without_numba_numpy_computes_and_the_extra_is_named(monkeypatch):
     monkeypatch.setattr(backend, "installed", lambda: False)
+    monkeypatch.setattr(ahead, "library", lambda: None)
     with backend.preferring(""):
         assert backend.fastest() == "numpy"
         body_velocity(GLASS, BODY, (0.1, 0.2), (1.0, 0.0))
@@ -433,14 +434,38 @@ def test_what_the_page_says_that_formulas_take_is_what_compiles():
     np.testing.assert_allclose(out, expected, rtol=1e-14)
 
 
+@compiled
+def test_kernels_built_ahead_serve_closed_laws_without_numba(monkeypatch):
+    """Other laws are left to NumPy; kernels of numba stand for those of a wheel."""
+    from rft.balance.compiled import Kernels, kernels_of
+
+    exact = record(GLASS)
+    built = Kernels(*kernels_of(type(exact)))
+    monkeypatch.setattr(backend, "installed", lambda: False)
+    monkeypatch.setattr(ahead, "library", lambda: built)
+    kernels_of.cache_clear()
+    assert backend.fastest() == backend.at_once() == "built"
+    with backend.preferring("built"):
+        assert backend.solves_compiled("auto", exact)
+        assert not backend.solves_compiled("auto", record(GLASS, "gauss:8"))
+        assert not backend.compiles("auto", exact)
+        found = body_velocity(GLASS, BODY, (0.4, -0.7), (1.0, 0.3))
+        assert kernels_of(type(exact)).solve is built.solve
+    kernels_of.cache_clear()
+    plain = body_velocity(GLASS, BODY, (0.4, -0.7), (1.0, 0.3), backend="numpy")
+    np.testing.assert_allclose(found.xi, plain.xi, rtol=0, atol=1e-9)
+
+
 @pytest.mark.timeout(900)  # the oldest numba compiles for minutes
 @compiled
 def test_code_is_compiled_beforehand(capsys):
-    from rft.balance.compiled import kernel
+    from rft.balance.compiled import kernels_of
+    from rft.balance.kernels import kernel
 
     runpy.run_module("rft", run_name="__main__")
     assert capsys.readouterr().out.startswith("compiled code is kept in ")
     kernel.cache_clear()
+    kernels_of.cache_clear()
     body_velocity(GLASS, BODY, (0.4, -0.7), (1.0, 0.3), backend="numba")
     assert sum(kernel(type(record(GLASS))).stats.cache_misses.values()) == 0
 
