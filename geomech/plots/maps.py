@@ -275,7 +275,9 @@ def ccf_map(
     return ax
 
 
-def draw_colours(ax: Axes, x: Any, y: Any, values: Any, top: float, shading: str):
+def draw_colours(
+    ax: Axes, x: Any, y: Any, values: Any, top: float, shading: str
+) -> Any:
     """Draw values (M, N) as colours from -top to top over x (N,) and y (M,), or over a
     mesh of these; return the image."""
     from cmcrameri import cm
@@ -419,7 +421,7 @@ def _rounded(field: Field, hidden: np.ndarray):
     return axes, mask
 
 
-def refined(field: Field, values: np.ndarray, degree: int = 3):
+def refined(field: Field, values: np.ndarray, degree: int = 3) -> tuple:
     """Return (axes, values) with points between those of the grid, for smooth lines;
     unchanged where there are singular shapes, and on grids that are fine already."""
     from scipy.interpolate import RectBivariateSpline

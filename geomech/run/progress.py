@@ -70,7 +70,7 @@ def counted(items: Iterable, count: int, progress: Callable | None) -> Iterator:
 
 
 @contextlib.contextmanager
-def progress(title: str, bar: bool = True):
+def progress(title: str, bar: bool = True) -> Iterator[Callable[[float], None]]:
     """Yield a function that takes the fraction done and shows it: as a bar in a
     notebook and, unless ``bar`` is False, on a terminal; else as lines on standard
     error. Inside another computation it is a part of that, under its own title."""

@@ -120,7 +120,7 @@ def geomech(
         ),
     ] = False,
     plugin: PluginOption = None,
-):
+) -> None:
     """Geometric mechanics of locomotion: from a force law to displacement."""
     from geomech.run.backend import at_once, prefer
 

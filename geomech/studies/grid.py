@@ -238,7 +238,9 @@ def _key_in_other_unit(key: str) -> str:
     return f"{key}_deg"
 
 
-def values_at_points(over: Mapping[str, list[float]], names: tuple[str, ...], value):
+def values_at_points(
+    over: Mapping[str, list[float]], names: tuple[str, ...], value: float | None
+) -> Any:
     """Return a number (N_1, ...) at the points of a sweep; None if it is unknown.
 
     names: sections that may have it, and last its key. It is that of the swept

@@ -21,6 +21,7 @@ import sys
 import types
 import warnings
 from pathlib import Path
+from typing import Any
 
 import llvmlite.binding as llvm
 import numba
@@ -134,7 +135,7 @@ class Cache(_Cache):
         self.path.unlink(missing_ok=True)
 
 
-def cached(kernel, purpose: str):
+def cached(kernel: Any, purpose: str) -> Any:
     """Return a kernel whose compiled code is stored on disk; print one line with its
     purpose if it has yet to be compiled."""
     kernel._cache = Cache(kernel.py_func)

@@ -150,7 +150,7 @@ def _padded(terms: np.ndarray, count: int) -> np.ndarray:
     )
 
 
-def mapped(function: Callable, *records):
+def mapped(function: Callable, *records) -> Any:
     """Return the record of function(array, ...) over the arrays of one record, or of
     several records of one class; the first record itself if no array changes."""
     first = records[0]

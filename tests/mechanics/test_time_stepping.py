@@ -415,3 +415,22 @@ def test_two_hundred_thousand_steps_of_random_marches(backend):
         f"\n{backend}: {steps:,} steps, {failures} failures, to {residuals.max():.1e}"
     )
     assert failures == 0
+
+
+# Of circles in glass, 64 phases, that stick and slip: the changes with half, a quarter
+# and an eighth of the phases are small by chance. Net poses of 1024 phases.
+LUCKY = {
+    0.4543302326829342: (-0.017186712687, -0.001628653204, -0.011921901768),
+    0.6814122420037888: (-0.038137641698, -0.003901619935, -0.031324130269),
+}
+
+
+def test_errors_cover_stick_and_slip_of_a_heavy_body():
+    body = Chain((0.8286411040705133, 0.6431445619053251, 0.9066951046284145))
+    gait = Circle(centre=(0.3695289476837925, 0.018390673250570422))
+    mass = BodyInertia(1.8664073335775546, 1 / (2 * np.pi), 1.0, 1.0)
+    scene = Scene(Swimmer(GLASS, body, (mass,)), gait)
+    net, error = estimate.direct(scene, gait, np.array([*LUCKY]), 64)
+    off = estimate.pose_distance(net, np.array([*LUCKY.values()]), 1.0)
+    assert (off < error).all()
+    assert (error < 60 * off.max()).all()

@@ -118,7 +118,7 @@ def _net_figure(scene: Scene, result: Result) -> Figure:
     return fig
 
 
-def net_values(result: Result):
+def net_values(result: Result) -> tuple:
     """Return (values, their errors, their spread by the medium or None, label) to draw.
 
     Values are the net distance per cycle, negative where it is backwards; where the

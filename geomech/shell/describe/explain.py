@@ -8,7 +8,7 @@ from geomech.shell import terminal
 from geomech.shell.options import SceneArgument
 
 
-def explain(name: SceneArgument):
+def explain(name: SceneArgument) -> None:
     """Print effects and engine of a scene, and what they cost. Results that the effects
     rule out are listed."""
     # The mechanics of scenes takes longer to load than the help of this command.

@@ -46,7 +46,7 @@ def lab(
         ),
     ] = None,
     yes: YesOption = False,
-):
+) -> None:
     """Make a page to draw loops on the CCF and watch the swimmer. It is one file, which
     needs no network and nothing installed: map, swimmer, and displacement of a cycle by
     three tiers with their errors."""

@@ -26,7 +26,7 @@ def reference(
         bool, typer.Option("--json-schema", help="print a JSON Schema of scene files")
     ] = False,
     plugin: PluginOption = None,
-):
+) -> None:
     """Print every key of a scene file. Each has its type, unit, default and meaning."""
     load_plugins(plugin)
     terminal.show([keys(section, json_schema)])

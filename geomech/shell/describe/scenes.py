@@ -20,7 +20,7 @@ def scenes(
             autocompletion=printable_names,
         ),
     ] = None,
-):
+) -> None:
     """List the built-in scenes and the named media."""
     # The mechanics of scenes takes longer to load than the help of this command.
     from geomech.shell.describe import builtin

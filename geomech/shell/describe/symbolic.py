@@ -25,7 +25,7 @@ def symbolic(
     ccf: Annotated[
         bool, typer.Option(help="print the CCF of every two joints, too")
     ] = True,
-):
+) -> None:
     """Print connection and CCF in closed form. Chains in a viscous or ideal fluid,
     afloat and on wheels have one."""
     terminal.show(formulas(load_scene(name), ccf, latex))

@@ -82,7 +82,9 @@ def pose_variables(
     return variables
 
 
-def scaled(variable: Variable, factor: Any, name: str, unit: str, label: str):
+def scaled(
+    variable: Variable, factor: Any, name: str, unit: str, label: str
+) -> Variable:
     """Return a variable times a factor, a number or an array that broadcasts."""
     return variable.with_arrays(
         lambda array: array * factor, name=name, unit=unit, label=label

@@ -484,7 +484,7 @@ def refuse_engine(scene: WalkerScene, by: str | None = None) -> None:
 # Pictures.
 
 
-def view(scene: WalkerScene):
+def view(scene: WalkerScene) -> Any:
     """Return the view that draws a walk of three dimensions
     (`rft.terradynamics.walking.view.View`)."""
     from rft.terradynamics.walking.view import View
