@@ -26,8 +26,9 @@ FASTEST = 5.0
 # s of computing, and number of batches of balances, that suffice to time them.
 TIMED_SECONDS = 0.25
 TIMED_BATCHES = 3
-# Times the median: a batch that takes longer has loaded or compiled code.
-LOADING = 20.0
+# Times the median: a batch that takes longer has loaded or compiled code, or follows
+# other work.
+LOADING = 3.0
 
 # Assumed seconds, for each place of the body where forces are evaluated. Measured with
 # the work around a balance: 2e-6 to 5e-6 by NumPy and 0.3e-6 to 1.2e-6 compiled in dry
@@ -146,23 +147,28 @@ class _Stopwatch:
             self.measured.append(now - self.last)
             self.assumed.append(seconds)
         self.last = now
-        if len(self.measured) >= TIMED_BATCHES and sum(self.measured) >= TIMED_SECONDS:
+        kept = self._without_loading()
+        if len(kept) < TIMED_BATCHES:
+            return
+        measured = sum(seconds for seconds, _ in kept)
+        if measured >= TIMED_SECONDS:
+            assumed = sum(seconds for _, seconds in kept)
             self.is_over = True
-            self.judge(self.cost.scaled(self._factor()))
+            self.judge(self.cost.scaled(float(measured / assumed)))
 
-    def _factor(self) -> float:
-        """Return the seconds of balances over those assumed, without batches that load
+    def _without_loading(self) -> list[tuple[float, float]]:
+        """Return (measured, assumed) seconds of the batches that have loaded no
         code."""
         batches = list(zip(self.measured, self.assumed))
         factors = sorted(measured / assumed for measured, assumed in batches)
+        if not factors:
+            return []
         largest = LOADING * factors[len(factors) // 2]
-        total_measured = 0.0
-        total_assumed = 0.0
-        for measured, assumed in batches:
-            if measured <= largest * assumed:
-                total_measured += measured
-                total_assumed += assumed
-        return total_measured / total_assumed
+        return [
+            (measured, assumed)
+            for measured, assumed in batches
+            if measured <= largest * assumed
+        ]
 
 
 def duration(seconds: float) -> str:

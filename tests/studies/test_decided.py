@@ -115,3 +115,14 @@ def test_a_minute_and_two_gigabytes_are_the_limits(cost, is_allowed):
     else:
         with pytest.raises(Refusal, match="here: 1 force balances"):
             cost.check("here", yes=False)
+
+
+def test_a_batch_after_other_work_does_not_tell(clock):
+    """Such as the loading of what an optimiser needs, before its first large batch."""
+    judged = []
+    decide(UNDECIDED, judged.append)
+    clock.solve(BATCH, count=5)
+    clock.solve(15 * BATCH)
+    clock.solve(BATCH, count=400)
+    (told,) = judged
+    assert told.seconds < 35.0
