@@ -251,9 +251,9 @@ class Rows:
         return self._numbers_at([[*columns].index(name) for name in names])
 
     def plain_numbers(self, indices: Sequence[int]) -> np.ndarray | None:
-        """Return the numbers (N, k) in k columns of the file, read by NumPy in a tenth
-        of the time; None where a row has anything else, which the caller reads cell by
-        cell, to say where it is."""
+        """Return the numbers (N, k) in k columns of the file, read by NumPy at
+        once; None where a row has anything else, which the caller reads cell by cell,
+        to say where it is."""
         texts = [text for _, text in self.rows]
         separators = len(self.words) - 1
         if self.separator == " " or self.decimal != "." or not texts or not indices:

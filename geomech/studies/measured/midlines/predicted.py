@@ -74,9 +74,8 @@ def compare(fit: Kinematics, medium: Any, effects: tuple = ()) -> Comparison:
     The body that moves is the piece from the first point to the last, and its motion is
     told in the unit of the measured one. effects: of the scene, such as drag on the
     head; their lengths are in lengths of that piece."""
-    means = (
-        2 * RESAMPLED + 4
-    )  # cycles solved for, of each of which each cycle is left out
+    # Means of all cycles, and of all but each, are solved for at every resampling.
+    means = 2 * RESAMPLED + 4
     count = means * (len(fit.used) + 1) * PHASES
     with prefer_backend(assumed_seconds(count, ELEMENTS, False, means, "numpy")):
         return _compared(fit, medium, effects)
