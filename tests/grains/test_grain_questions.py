@@ -146,6 +146,7 @@ def test_a_swim_stands_beside_the_tiers(obeyed, tmp_path):
     y = result["cycle_y"].values
     np.testing.assert_allclose(np.hypot(x, y), 0.08, rtol=1e-6)
     np.testing.assert_allclose(y, 0.08 * np.sin(0.1), rtol=1e-3)
+    assert float(result["work"]) == pytest.approx(0.25)
     # Ends that both push half as much are one end that pushes, to 3 %.
     flank = rod_fit("flank-drag", end_caps="fitted")
     one_end = dataclasses.replace(flank.caps(0.03), head=flank.end_caps, tail=0.0)

@@ -13,6 +13,7 @@ from geomech.mathematics.geometry.representations import harmonics
 from geomech.mathematics.geometry.representations.images import (
     cycle_images,
     images,
+    solved_count,
 )
 from geomech.mathematics.geometry.traits import NOTHING, Traits
 from geomech.mathematics.systems.swimmer import Swimmer
@@ -195,6 +196,20 @@ def test_what_is_nearly_an_image_is_none(part, gait, off, place):
     assert cycle_images(*cycle, BOTH).count == 9
     cycle[part][gait][place] += off
     assert cycle_images(*cycle, BOTH).count == 32
+
+
+@pytest.mark.parametrize("name", GAITS)
+def test_few_phases_tell_how_many_are_solved(name):
+    """Of any number; images lie on phases of some of these only."""
+    for traits in (NOTHING, MIRROR, BACKWARDS, BOTH):
+        for phases in (32, 201, 1024, 2049, 4096):
+            solved = cycle_images(*GAITS[name].cycle(phases), traits).count
+            assert solved_count(GAITS[name], phases, traits) == solved
+
+
+def test_a_million_phases_are_counted():
+    assert solved_count(Circle(), 1_000_000, BOTH) == 250_001
+    assert solved_count(Sine(elements=100), 1_000_000, MIRROR) == 500_000
 
 
 def test_gaits_side_by_side_have_the_images_that_all_have():

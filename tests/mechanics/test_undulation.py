@@ -219,7 +219,13 @@ def test_any_gait_has_the_wave_that_its_bends_make():
     known, moved = (undulation.performance(s, [0.4, 0.87]) for s in (CHAIN, MODES))
     for key in ("waves", "wavelength", "relative_curvature", "efficiency"):
         np.testing.assert_allclose(moved[key], known[key], rtol=0.03)
+    np.testing.assert_array_equal(
+        known["wavelength"], CHAIN.gait.wavelength([0.4, 0.87])
+    )
     assert np.isnan(undulation.performance(PAIR, [1.0])["wavelength"]).all()
+    bent = CHAIN.changed(gait=dataclasses.replace(CHAIN.gait, offset=0.3))
+    of_straight = bent.gait.wavelength([0.87])
+    assert undulation.performance(bent, [0.87])["wavelength"] < 0.9 * of_straight
 
 
 def waving(waves, elements=50, phases=64, effects=(), **gait):

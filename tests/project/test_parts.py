@@ -337,6 +337,25 @@ class Frost(GroundEffect):
         return ground._replace(strength=ground.strength * (1.0 + self.gain))
 """,
 }
+
+
+def three_joints(alpha, alphadot):
+    first, second, third = np.moveaxis(np.asarray(alphadot), -1, 0)
+    return np.stack([first, second * third, 0 * third], -1)
+
+
+def two_joints(alpha, alphadot):
+    first, second = np.moveaxis(np.asarray(alphadot), -1, 0)
+    return np.stack([first, second, 0 * first], -1)
+
+
+def test_a_velocity_alone_is_one_of_two_joints():
+    assert library.study(two_joints).scene.system.joints == 2
+    assert library.study(three_joints, joints=3).scene.system.joints == 3
+    with pytest.raises(ValueError, match="takes 3 joints.*give joints = 3"):
+        library.study(three_joints)
+
+
 LAWS_OF_FAMILIES = """
 import sys
 sys.path[:0] = [sys.argv[1], sys.argv[2]]

@@ -260,6 +260,21 @@ def test_a_row_tells_place_attitude_and_their_rates():
     assert [row[x] for x in names] == pytest.approx(expected)
 
 
+def test_the_state_of_a_stride_knows_no_place_and_no_heading():
+    """Limit cycles are told by it."""
+    one = Simulation(XPLORER.walker, QUICK)
+    data = one.body.data
+    states = []
+    for yaw in (0.0, 1.2):
+        turn = Rotation.from_euler("ZYX", (yaw, 0.3, -0.2))
+        data.qpos[:7] = [yaw, -yaw, 0.5, *turn.as_quat()[[3, 0, 1, 2]]]
+        velocity = Rotation.from_euler("z", yaw).apply([1.0, 2.0, 3.0])
+        data.qvel[:6] = [*velocity, 0.5, -0.6, 0.7]
+        mujoco.mj_forward(one.body.model, data)
+        states.append(one.scaled_state())
+    np.testing.assert_allclose(states[1], states[0], atol=1e-12)
+
+
 def test_a_hull_is_a_box_that_pitches_as_its_robot_is_told():
     """It rolls and yaws as a box would."""
     robot = Rhex(0.2, 0.15, 0.03, 0.06, CLeg(0.025, 0.012), (-0.05, 0.06), inertia=5e-4)

@@ -278,7 +278,7 @@ def test_a_height_field_is_the_surface(solved_by):
     assert_close(found, expected, 1e-12)
 
 
-REGIONS = "2 * x - y / 2 > 0.3 and y >= -0.5", "-1 < x < 0.02", "0.01 + x <= 0.5 * y"
+REGIONS = "2 * x - y / 2 > 0.3 and y >= -0.5", "-1 < x < 0.02", "-x >= 0.01 - 0.5 * y"
 
 
 def six_geoms():

@@ -63,12 +63,14 @@ def output(question, name="out.csv"):
     return pipeline.Output(Path(name), write)
 
 
-def test_every_command_has_one_order(asked):
+def test_every_command_has_one_order(asked, capsys):
     question = asked()
     pipeline.execute(question, [output(question), output(question, "more.csv")])
     steps = ["check", "cost", "compute", "write out.csv", "write more.csv"]
     assert question.told == steps
     assert Path("out.csv").read_text() == "phase\n0.0\n1.5\n3.0\n"
+    printed = pipeline.printed(RESULT, as_json=False, everything=False)
+    assert capsys.readouterr().out.splitlines() == "\n".join(printed).splitlines()
 
 
 @pytest.mark.parametrize("fails", ["check", "cost", "compute", "write out.csv"])

@@ -26,6 +26,7 @@ from geomech.questions.shared import base
 from geomech.run.digest import digest
 from geomech.shell import cli
 from geomech.shell.command import declaration, parameters
+from rft.core.refusal import Refusal
 
 FIELD = {"grid": 9, "phases": 32}
 FROZEN = frozen.FOLDER
@@ -200,6 +201,18 @@ def test_a_picture_of_a_file_is_that_of_the_result(result, tmp_path):
             np.testing.assert_array_equal(a.get_xydata(), b.get_xydata())
 
 
+def test_every_switch_of_a_picture_draws_or_is_refused(result):
+    """These results have no stretched shape space."""
+    if result.question.draw is None:
+        pytest.skip("there is none")
+    for name, (_, kind, _) in declaration(type(result.question)).picture.items():
+        if name == "stretch":
+            with pytest.raises(Refusal, match="was not computed"):
+                result.plot(stretch=True)
+        elif kind is bool:
+            assert result.plot(**{name: True}).axes, name
+
+
 def test_a_method_of_a_study_asks_the_same(asked, result):
     if not hasattr(geomech.Study, asked.name) or asked.subject is None:
         pytest.skip("it is not asked of a scene")
@@ -209,6 +222,15 @@ def test_a_method_of_a_study_asks_the_same(asked, result):
         if variable.name not in ROUGH:
             values = variable.values, again[variable.name].values
             np.testing.assert_array_equal(*values, variable.name)
+
+
+def test_a_body_of_one_joint_has_no_map():
+    scene = geomech.load("three-link-viscous").changed(
+        body=geomech.bodies.Chain((1, 2)),
+        gait=geomech.gaits.Fourier(cos=((0.5,),), sin=((0.0,),)),
+    )
+    with pytest.raises(Refusal, match="one joint has no map"):
+        geomech.ccf(scene)
 
 
 # Results made by hand

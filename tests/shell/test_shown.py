@@ -4,6 +4,7 @@ xarray."""
 import dataclasses
 import itertools
 import pickle
+import re
 import sys
 
 import numpy as np
@@ -41,6 +42,31 @@ def study():
 @pytest.fixture(scope="module")
 def table(study):
     return study.displacements([0.5, 1.0, 1.5], ["area", "direct"])
+
+
+def told(thing, quantity):
+    """Return the numbers that the repr of a thing tells of a quantity: one, or its
+    least and most."""
+    number = r"(-?[\d.]+(?:e-?\d+)?)"
+    pattern = rf"{quantity} {number}(?: to {number})?"
+    found = re.search(pattern, repr(thing))
+    return [float(x) for x in found.groups() if x]
+
+
+def test_a_repr_tells_the_ranges_of_what_it_shows(study):
+    cycle = study.scene.cycle(phases=32, work=True)
+    shown = [
+        (cycle, "x", cycle.net[..., :1]),
+        (cycle, "theta", cycle.net[..., 2:]),
+        (cycle.work, "power", cycle.work.power),
+        (cycle.work, "slip", cycle.work.slip),
+        (study.fitted, "A x", study.fitted.A[0]),
+        (study.curvature, "theta", study.curvature.values[2]),
+    ]
+    for thing, quantity, values in shown:
+        numbers = told(thing, quantity)
+        limits = [np.min(values), np.max(values)][: len(numbers)]
+        assert numbers == pytest.approx(limits, rel=5e-3), (quantity, repr(thing))
 
 
 def test_nothing_is_computed_to_show_a_study(study):

@@ -8,16 +8,18 @@ import numpy as np
 import pytest
 
 from geomech import scenes
-from geomech.mathematics.gaits import Fourier
+from geomech.mathematics.gaits import Fourier, Wave
+from geomech.mathematics.systems import Swimmer
 from geomech.questions.swimmers.accuracy import Accuracy
 from geomech.questions.swimmers.ccf import Ccf
 from geomech.questions.swimmers.run import Run
 from geomech.questions.swimmers.sweep import Sweep
 from geomech.run.cost import BASE
+from geomech.scenes import Scene
 from geomech.studies.estimates import cost, effort
 from geomech.studies.mechanics import motion
 from geomech.studies.scene_tables import SceneTables
-from rft import Backbone
+from rft import Backbone, Chain, Viscous
 from rft.balance.listening import listening
 from rft.effects import SkinFriction, Slope, Transient
 
@@ -142,6 +144,7 @@ def test_a_table_takes_the_balances_foretold(scene, grid, name, solved):
 
 
 COARSE = {"grid": 7, "phases": 32}
+FOUR_LINKS = Scene(Swimmer(Viscous(), Chain((1, 1, 1, 1))), Wave(joints=3))
 MEDIA = {"medium.ratio": [2.0, 3.0], "gait.amplitude": [0.5, 1.0, 1.5]}
 QUESTIONS = {
     "accuracy": Accuracy(VISCOUS.with_numerics(grid=5)),
@@ -152,6 +155,7 @@ QUESTIONS = {
     "slice": Ccf(GLASS.with_numerics(**COARSE), "1,2"),
     "linear slice": Ccf(VISCOUS.with_numerics(**COARSE), "1,2"),
     "all of a scene": Run(VISCOUS.with_numerics(grid=9, phases=32)),
+    "all of three joints": Run(FOUR_LINKS.with_numerics(grid=5, phases=16)),
 }
 
 

@@ -123,6 +123,7 @@ def test_a_body_that_slides_along_a_sine_has_the_numbers_of_the_sine(amplitude, 
         size = max(abs(value), 0.3)
         assert f.value(name)[0] == pytest.approx(value, abs=0.012 * size), name
     assert f.value("slip")[0] < 0.03
+    assert f.own_length == pytest.approx(1.0, rel=0.01)
 
 
 def test_slip_and_efficiency_without_noise_are_those_of_the_balance():
