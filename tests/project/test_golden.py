@@ -44,6 +44,7 @@ def test_nothing_changed_that_nobody_meant_to_change(part, least):
         (golden.walkers, 60),
         (golden.intruders, 110),
         (golden.measurements, 105),
+        (golden.forms, 450),
         (golden.costs, 140),
     ],
     ids=lambda x: getattr(x, "__name__", ""),

@@ -57,6 +57,7 @@ TOLERANCE = 1e-12
 LOOSE_TOLERANCE = 1e-8
 RESIDUAL_TOLERANCE = 1e-6
 LOOSE = ("walk", "measured, log", "measured, rod", "measured, plates")
+LOOSE += ("form, optimum", "form, midlines")
 SOLVED = {"regularisation": 1e-3, "tolerance": 1e-15}
 COARSE = {
     "regularisation": 1e-3,
@@ -151,16 +152,18 @@ def digest(values) -> list[float]:
     flat = np.ravel(np.array(values, float))
     if flat.size > 12:
         some = flat[np.linspace(0, flat.size - 1, 7).astype(int)]
-        weighted = flat * np.cos(1.0 + np.arange(flat.size))
-        flat = np.array([*some, np.sqrt((flat**2).mean()), weighted.mean()])
+        known = np.nan_to_num(flat)
+        weighted = known * np.cos(1.0 + np.arange(flat.size))
+        flat = np.array([*some, np.sqrt((known**2).mean()), weighted.mean()])
     return np.where(np.abs(flat) < 1e-9, 0.0, flat).tolist()
 
 
 # Components of one vector make one entry: one that vanishes is rounding of the others.
 VECTORS = {"x": "place", "y": "place", "z": "place"}
 VECTORS |= {"pitch": "attitude", "roll": "attitude", "yaw": "attitude"}
-# Times, and how a solver came to its end.
-UNRECORDED = {"seconds", "computed_before", "iterations", "evaluations"}
+# Times, what is chosen by them, and how a solver came to its end.
+UNRECORDED = {"seconds", "computed_before", "iterations", "evaluations", "kept"}
+UNRECORDED |= {"best_value", "best_error", "best_seconds"}
 
 
 def of_result(name: str, result, digest=digest):
@@ -280,6 +283,62 @@ def measurements():
             yield from printed(f"measured, {name}", *line.split())
 
 
+# A chain whose field has a frame of its own, and one that is paced.
+FRAMED = SCENE.replace('"link-1"', '"minimum-perturbation"')
+PACED = SCENE.replace("[numerics]", "frequency = 2.0\n[numerics]")
+FORMS = {
+    "metric": "ccf viscous.toml --metric",
+    "stretched": "ccf viscous.toml --stretch --plot a.png",
+    "compared frames": "ccf scene.toml --compare-frame minimum-perturbation",
+    "slice": "ccf four.toml --pair 1,3 --slice 0.2,0.1,-0.3",
+    "all slices": "ccf four.toml",
+    "connection of a slice": "connection four.toml --pair 2,3 --slice 0.2,0.1,-0.3",
+    "connections compared": "connection scene.toml --compare-frame link-2",
+    "velocity of a table": "velocity table.toml --alpha 0.3,0.2 --alphadot 1,0.5",
+    "velocity in a frame": "velocity framed.toml --alpha 0.3,0.2 --alphadot 1,0.5",
+    "displacement in a frame": "displacement framed.toml --amplitudes 0.5,1",
+    "effort": "displacement paced.toml --amplitudes 0.5,1 --effort",
+    "cycles": "trajectory paced.toml --cycles 2",
+    "cycles in a frame": "trajectory framed.toml --cycles 2",
+    "cycles of a table": "trajectory table.toml --cycles 2",
+    "forces": "forces paced.toml --radius 0.02 --stress 900",
+    "forces of a backbone": "forces bends.toml",
+    "optimum, efficiency": (
+        "optimize scene.toml --objective efficiency --harmonics 1 --starts 1"
+    ),
+    "optimum, turning": (
+        "optimize viscous.toml --objective turning --harmonics 2 --starts 1"
+    ),
+    "optimum, speed": (
+        "optimize viscous.toml --objective speed --harmonics 1 --rate 3 --power 2"
+    ),
+    "optimum, stretched": "optimize viscous.toml --harmonics 1 --stretch --plot a.png",
+    "sweep of speeds": "sweep paced.toml --over medium.gamma0_deg=10:20:3",
+    "sweep of lengths": "sweep scene.toml --over body.length=0.2,0.4",
+    "stress": "stress grains.toml --beta 30 --gamma -50",
+    "midlines": "fit-gait trial.csv --medium glass-0.3mm-close",
+    "accuracy of a gait": "accuracy viscous.toml --runs 1",
+    "accuracy of an intruder": "accuracy leg.toml --runs 1",
+    "accuracy of a walker": "accuracy walk.toml --runs 1",
+}
+
+
+def forms():
+    """Questions in the forms that other entries leave out: slices, metrics, frames,
+    other objectives, settings of each kind of scene."""
+    viscous = geomech.load("three-link-viscous").text + "\n[numerics]\nphases = 32\n"
+    with frozen.place() as here:
+        (here / "scene.toml").write_text(SCENE)
+        (here / "framed.toml").write_text(FRAMED)
+        (here / "paced.toml").write_text(PACED)
+        (here / "viscous.toml").write_text(f"{viscous}grid = 9\nharmonics = 5\n")
+        for name, line in FORMS.items():
+            yield from printed(f"form, {name}", *line.split())
+        for name in ("four", "table"):
+            everything = geomech.study(f"{name}.toml").run()
+            yield from of_result(f"form, all of {name}", everything)
+
+
 # Lines whose costs are known in some hundredths of a second, by what they are about.
 ASKED = {
     "gait": (
@@ -340,6 +399,7 @@ PARTS = {
     intruders: ("intruder",),
     walkers: ("walker",),
     measurements: ("measured",),
+    forms: ("form",),
     costs: ("cost",),
 }
 
@@ -360,13 +420,17 @@ def kept(*parts) -> dict[str, list[float]]:
 
 def change(old: list[float] | None, new: list[float] | None) -> float:
     """Return the largest difference over the largest number; infinite where an entry is
-    missing or has another size."""
+    missing, has another size, or other places without a number."""
     if old is None or new is None or len(old) != len(new):
         return np.inf
-    difference = np.abs(np.subtract(old, new)).max(initial=0.0)
+    pair = np.array([old, new], float)
+    unknown = np.isnan(pair)
+    if (unknown[0] != unknown[1]).any():
+        return np.inf
+    difference = np.nanmax(np.abs(pair[0] - pair[1]), initial=0.0)
     if difference == 0.0:
         return 0.0
-    return difference / np.abs([*old, *new]).max()
+    return difference / np.nanmax(np.abs(pair))
 
 
 def allowed(name: str) -> float:
