@@ -3,6 +3,7 @@ result is the same in every form."""
 
 import ast
 import dataclasses
+import html
 import json
 import pickle
 import re
@@ -23,6 +24,7 @@ from geomech import questions
 from geomech.core.variables import Result, Variable
 from geomech.io import results as io
 from geomech.questions.shared import base
+from geomech.results import files
 from geomech.run.digest import digest
 from geomech.shell import cli
 from geomech.shell.command import declaration, parameters
@@ -78,6 +80,38 @@ ASKED = {
     ),
     "fit_medium of a plate": (str(FROZEN / "push.csv"), {}, {}, {"area": 1e-3}),
     "accuracy": ("three-link-viscous", FIELD, {"runs": 1}, {"runs": 2}),
+    "accuracy of a walker": (str(FROZEN / "walk.toml"), {}, {"runs": 1}, {}),
+    "accuracy of a leg": (str(FROZEN / "leg.toml"), {}, {"runs": 1}, {}),
+    "displacement with effort": (
+        "three-link-viscous",
+        FIELD,
+        {"amplitudes": (0.5, 1.0), "effort": True},
+        {"tiers": ("path",)},
+    ),
+    "ccf of frames": ("three-link-viscous", FIELD, {"compare_frame": "link-1"}, {}),
+    "ccf with a metric": ("three-link-viscous", FIELD, {"metric": True}, {}),
+    "ccf of slices": (str(FROZEN / "four.toml"), {}, {"pair": "1,3"}, {}),
+    "connection of slices": (
+        str(FROZEN / "four.toml"),
+        {},
+        {"pair": "1,3"},
+        {"slice": (0.1, 0.2, 0.3)},
+    ),
+    "connection of frames": (
+        "three-link-viscous",
+        FIELD,
+        {"compare_frame": "link-1"},
+        {},
+    ),
+    "optimize for speed": (
+        "three-link-viscous",
+        FIELD,
+        {"objective": "speed", "harmonics": 1, "starts": 1, "rate": 3.0, "power": 2.0},
+        {"power": 1.0},
+    ),
+    "run of slices": (str(FROZEN / "four.toml"), {}, {}, {}),
+    "run of a table": (str(FROZEN / "table.toml"), {}, {}, {}),
+    "trajectory of a table": (str(FROZEN / "table.toml"), {}, {}, {"cycles": 2}),
 }
 # Differ from run to run: times, and which setting is the quickest.
 ROUGH = {"kept", "evaluations", "seconds", "computed_before"}
@@ -89,6 +123,8 @@ def subject_of(kind):
     if kind == "stress" or kind.startswith("fit_"):
         return name
     scene = geomech.load(name)
+    if not numerics:
+        return scene
     if kind == "walk":
         numerics = dataclasses.replace(scene.numerics, **numerics)
         return dataclasses.replace(scene, numerics=numerics)
@@ -106,12 +142,17 @@ def without_lammps():
 
 
 @pytest.fixture(scope="module", params=ASKED)
-def asked(request):
-    kind = questions.question(request.param.split()[0])
+def form(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def asked(form):
+    kind = questions.question(form.split()[0])
     about = []
-    if ASKED[request.param][0]:
-        about.append(subject_of(request.param))
-    return kind(*about, **ASKED[request.param][2])
+    if ASKED[form][0]:
+        about.append(subject_of(form))
+    return kind(*about, **ASKED[form][2])
 
 
 @pytest.fixture(scope="module")
@@ -145,9 +186,9 @@ def test_a_declaration_is_a_command_and_a_schema(asked):
     assert json.loads(json.dumps(schema)) == schema
 
 
-def test_the_digest_is_of_the_fields(asked):
+def test_the_digest_is_of_the_fields(form, asked):
     assert digest(asked) == digest(dataclasses.replace(asked, progress=print))
-    for name, value in ASKED[asked.name][3].items():
+    for name, value in ASKED[form][3].items():
         assert digest(asked) != digest(dataclasses.replace(asked, **{name: value}))
 
 
@@ -187,6 +228,20 @@ def test_all_forms_have_one_vocabulary(result):
     assert xarray.Dataset.from_dict(data).attrs == dict(data["attrs"])
 
 
+def test_a_data_frame_has_the_columns_of_a_table(result):
+    frame = result.to_dataframe().reset_index()
+    columns = io.columns(result, files.table_dims(result))
+    assert {*columns} <= {*frame.columns}
+    for name, values in columns.items():
+        np.testing.assert_array_equal(frame[name], values, name)
+
+
+def test_a_page_shows_the_words_and_numbers_of_the_text(result):
+    page = re.sub("<[^>]*>", " ", html.unescape(result._repr_html_()))
+    shown = {*page.split()}
+    assert [word for word in str(result).split() if word not in shown] == []
+
+
 def test_a_result_is_pickled(result):
     assert_same(result, pickle.loads(pickle.dumps(result)))
 
@@ -213,11 +268,11 @@ def test_every_switch_of_a_picture_draws_or_is_refused(result):
             assert result.plot(**{name: True}).axes, name
 
 
-def test_a_method_of_a_study_asks_the_same(asked, result):
+def test_a_method_of_a_study_asks_the_same(form, asked, result):
     if not hasattr(geomech.Study, asked.name) or asked.subject is None:
         pytest.skip("it is not asked of a scene")
     study = geomech.study(asked.subject)
-    again = getattr(study, asked.name)(**ASKED[asked.name][2])
+    again = getattr(study, asked.name)(**ASKED[form][2])
     for variable in result.variables:
         if variable.name not in ROUGH:
             values = variable.values, again[variable.name].values

@@ -213,6 +213,13 @@ class Ccf(Question):
         from geomech.results.scenes import scene_of
         from geomech.studies.estimates.effort import units
 
+        if stretch and "stretched_shape" not in result:
+            raise Refusal(
+                "the stretched shape space was not computed",
+                instead="say ``stretched``, of a scene of two joints",
+            )
+        if stretch and ax is not None:
+            raise Refusal("a stretched map is drawn as a figure", instead="drop ``ax``")
         scene = scene_of(result)
         labels = shape_labels(scene.system)
         options = {"labels": labels, "components": component, "clim": clim}
@@ -242,11 +249,6 @@ class Ccf(Question):
             )
         options.update(gaits=[scene.gait], error=error)
         if stretch:
-            if "stretched_shape" not in result:
-                raise Refusal(
-                    "the stretched shape space was not computed",
-                    instead="say ``stretched``",
-                )
             unit = units(scene.system)["path_length"]
             plane = stretch_of(result)
             return plots.stretched_figure(ccf, plane, unit=unit, **options)
