@@ -230,6 +230,8 @@ def test_a_body_at_rest_creeps_as_its_sinkage_says():
         sunk = 0.028 - data.qpos[2]
         assert 1e-4 < plastic < later
         assert sunk == pytest.approx(later, abs=0.05 * (later - plastic))
+        model.opt.gravity[2] *= 1e6
+        assert sand.sinkage(data, 0.5) == (math.inf, math.inf)
 
 
 # Ground: slopes, hills and regions
@@ -559,6 +561,8 @@ def test_simulations_have_media_of_their_own(regions):
     with rft.mujoco.attach(model, media[2], rounding=0.02, regions=regions) as sand:
         batch = sand.batch(2, 2, media=given)
         sand.media[0] = media[2]
+        whole = (media[2], OTHER) if regions else media[2]
+        assert list(sand.media) == sand.media[:] == [whole, given[1]]
         batch.step(nstep=100)
         found = batch.bind("qpos").copy()
     other = dict.fromkeys(regions, media[0])

@@ -414,3 +414,8 @@ def test_the_error_of_a_run_covers_steps_and_elements():
     true = np.linalg.norm(ends[0] - ends[1])
     assert 0.5 * true < error.step + error.elements < 4.0 * true
     assert error.moved > 0.1 and min(error.step, error.elements) > 0.0
+    with rft.mujoco.attach(model, LOOSE) as sand:
+        falling = mujoco.MjData(model)
+        free_error = sand.error(falling, 0.05)  # it touches no grains
+    assert free_error.elements == 0.0 < free_error.step
+    assert free_error.moved == pytest.approx(9.81 / 2 * 0.05**2, rel=0.01)

@@ -82,7 +82,18 @@ EQUAL_TO_THE_BALL = {
     "a triangle missing": (BALL.vertices, BALL.faces[1:]),
     "rounded corners": soup(),
 }
+def with_a_wall():
+    """Return the box with a wall of single triangles across its middle."""
+    rim = np.flatnonzero(np.abs(BOX.vertices[:, 0]) < 1e-12)
+    y, z = BOX.vertices[rim, 1:].T
+    rim = rim[np.argsort(np.arctan2(z, y))]
+    middle = np.full(len(rim), len(BOX.vertices))
+    wall = np.stack([middle, rim, np.roll(rim, -1)], -1)
+    return np.vstack([BOX.vertices, [0, 0, 0]]), np.concatenate([BOX.faces, wall])
+
+
 EQUAL_TO_THE_BOX = {
+    "a wall across": with_a_wall(),
     "halves with a wall between": joined(
         placed(HALF, (-0.005, 0, 0)), placed(HALF, (0.005, 0, 0))
     ),
@@ -114,6 +125,17 @@ def test_a_mesh_bears_what_grains_touch_of_it(like, triangles, seed):
     back = Mesh((mesh.vertices - middle) @ turn, mesh.faces)
     assert back.volume == pytest.approx(like.volume, rel=1e-4)
     assert force(back) == pytest.approx(force(like), rel=2e-4, abs=1e-5)
+
+
+@pytest.mark.parametrize("k", range(12))
+def test_triangles_without_area_are_merged_with_others(k):
+    """Whichever triangle of a box has a corner on an edge."""
+    vertices, faces = with_corner_on_an_edge(True)
+    order = np.roll(np.arange(len(faces)), k)
+    mesh, notes = sound(vertices, faces[order])
+    assert notes == ("1 triangle without area merged with others",)
+    assert (len(mesh.faces), mesh.areas.min() > 1e-5) == (len(faces), True)
+    assert force(mesh) == pytest.approx(force(CUBE), rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,5 @@
-"""Closed meshes of bodies with a few sizes, m: sphere, cylinder, screw, capsule, box,
-leg. The origin is at the middle, or at the hip of a leg."""
+"""Closed meshes of bodies with a few sizes, m: sphere, cylinder, screw, box, leg.
+The origin is at the middle, or at the hip of a leg."""
 
 from __future__ import annotations
 
@@ -100,26 +100,6 @@ def screw(
         ring = [np.full_like(turn, x), r * np.cos(turn), r * np.sin(turn)]
         rings.append(np.stack(ring, -1))
     return _tube(np.array(rings), across, nose)
-
-
-def capsule(radius: float, half: float, around: int = 24, along: int = 4) -> Mesh:
-    """Return a rod along z of length 2 ``half`` with a half sphere at either end.
-
-    around, along: numbers of quadrilaterals. The poles are cut off flat within a
-    quarter of a triangle's angle of the axis."""
-    _check_sizes(radius=radius, half=half)
-    turn = 2 * np.pi * np.arange(_checked_count("around", around, 4)) / around
-    along = _checked_count("along", along, 1)
-    polar = np.linspace(0.25, around / 4, max(2, around // 4)) * 2 * np.pi / around
-    z_low = -half - radius * np.cos(polar)
-    z_rod = np.linspace(-half, half, along + 1)[1:-1]
-    r_low = radius * np.sin(polar)
-    r_rod = np.full(along - 1, radius)
-    z = np.concatenate([z_low, z_rod, -z_low[::-1]])
-    r = np.concatenate([r_low, r_rod, r_low[::-1]])
-    x = np.outer(r, np.cos(turn))
-    y = np.outer(r, np.sin(turn))
-    return _tube(np.stack([x, y, z[:, None] + 0 * turn], -1), 1)
 
 
 def box(sides, m: int | Sequence[int] = 1) -> Mesh:
