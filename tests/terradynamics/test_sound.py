@@ -82,6 +82,8 @@ EQUAL_TO_THE_BALL = {
     "a triangle missing": (BALL.vertices, BALL.faces[1:]),
     "rounded corners": soup(),
 }
+
+
 def with_a_wall():
     """Return the box with a wall of single triangles across its middle."""
     rim = np.flatnonzero(np.abs(BOX.vertices[:, 0]) < 1e-12)
