@@ -41,6 +41,7 @@ from rft.core.refusal import Refusal, formatted, located
 LARGEST_NUMBER = 1e12
 ENDINGS = (".csv", ".tsv", ".txt", ".dat")  # of the names of tables
 SAMPLE_LINES = 400  # in which separator and header are looked for
+HEAD_LINES = 2000  # of a file whose header alone is asked for
 SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
 # First words of the header lines of DeepLabCut.
 DEEPLABCUT_WORDS = ("scorer", "individuals", "bodyparts", "coords")
@@ -226,6 +227,13 @@ class Rows:
     def cells(self, text: str) -> list[str]:
         """Return the cells of a row, without blanks and quotes around them."""
         return split(text, self.separator)
+
+    def column(self, k: int) -> list[str]:
+        """Return the cells (N,) of a column; each row has that many."""
+        texts = [text for _, text in self.rows]
+        if self.separator == " " or any('"' in text for text in texts):
+            return [self.cells(text)[k] for text in texts]
+        return [text.split(self.separator, k + 1)[k].strip() for text in texts]
 
     def number(self, cell: str) -> float | None:
         """Return the number in a cell, None if it is none. Digits in groups, as 1_000,
@@ -435,9 +443,21 @@ class Rows:
             warnings.warn(f"{self.name}: {'; '.join(notes)}", Note, stacklevel=4)
 
 
-def read(path: str | Path, largest: int, what: str) -> Rows:
+def read_header(path: str | Path, largest: int, what: str) -> tuple[str, ...]:
+    """Return the words of the header that `read` finds, as `Rows.header` has them, from
+    the first lines of a file, unless they are all comments."""
+    _, words = read(path, largest, what, HEAD_LINES).header
+    if any(words):
+        return words
+    return read(path, largest, what).header[1]
+
+
+def read(
+    path: str | Path, largest: int, what: str, most_lines: int | None = None
+) -> Rows:
     """Return the table in a text file of at most ``largest`` bytes. Refusal if it is
-    none. what: the cure of that refusal, the columns that the file should have."""
+    none. what: the cure of that refusal, the columns that the file should have.
+    most_lines: from the top of the file, by default all."""
     name = Path(path).name
     try:
         raw = files.read(path, largest)
@@ -453,6 +473,8 @@ def read(path: str | Path, largest: int, what: str) -> Rows:
         raise Refusal(
             f"cannot read {str(path)!r}", because="it is not text", instead=what
         )
+    if most_lines is not None:
+        text = "\n".join(text.split("\n", most_lines)[:most_lines])
     lines, comments = _without_comments(text)
     separator = _separator([line for _, line in lines[:SAMPLE_LINES]])
     if separator != ",":
@@ -538,9 +560,12 @@ def _without_comments(
 ) -> tuple[list[tuple[int, str]], list[tuple[int, str]]]:
     """Return (line number, text) of the lines that are not empty, and of the texts
     after #."""
+    numbered = enumerate(text.split("\n"), 1)
+    if "#" not in text:
+        return [(k, line.strip(" ")) for k, line in numbered if line.strip()], []
     lines = []
     comments = []
-    for number, line in enumerate(text.split("\n"), 1):
+    for number, line in numbered:
         line, _, comment = line.partition("#")
         if line.strip():
             lines.append((number, line.strip(" ")))

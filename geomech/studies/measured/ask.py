@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from geomech.io.rows import read as read_rows
+from geomech.io.rows import read_header
 from geomech.studies.measured.log import Log
 from geomech.studies.measured.midlines import reader
 from geomech.studies.measured.midlines.trial import Trial
@@ -55,7 +55,7 @@ def form_of(measured: str | Path | Log | Trial, options: Mapping[str, Any]) -> s
         refuse(measured.name, MIDLINES, of_logs)
         return MIDLINES
     file = Path(measured)
-    header = read_rows(file, reader.LARGEST_FILE, HEADERS).header[1]
+    header = read_header(file, reader.LARGEST_FILE, HEADERS)
     form = reader.kind_of(header)
     if not form and of_logs and of_midlines:
         raise Refusal(

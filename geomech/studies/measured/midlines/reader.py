@@ -448,9 +448,9 @@ def _long(source: Rows, header: tuple[str, ...], bare: dict[str, int]) -> Table:
     if key is None:
         names, point = _unnamed(t, frame, source)
     else:
-        labels = [source.cells(text)[key] for _, text in source.rows]
+        labels = source.column(key)
         names = list(dict.fromkeys(labels))
-        if all(re.fullmatch(r"[0-9]+(\.0*)?", label) for label in labels):
+        if all(re.fullmatch(r"[0-9]+(\.0*)?", name) for name in names):
             names = sorted(names, key=float)
         number = {name: k for k, name in enumerate(names)}
         point = np.array([number[label] for label in labels])
