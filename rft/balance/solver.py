@@ -94,9 +94,29 @@ def solve(
         driver = compiled_driver()
         worth = COMPILED_WORTH
         batch = 4 * batch
-    results = np.zeros((RESULT_ROWS, size))
-    limit = np.zeros(size)
-    results[RESIDUAL] = np.inf
+    methods: list = [QUICK, *WALKS, *SLOW]
+    if guess is not None:
+        methods.insert(0, WARM)
+        with np.errstate(over="ignore"):
+            guess = guess / scale
+    unsolved = np.arange(size)
+    starts = guess is None or is_possible(*guess).all()
+    if starts and 0 < size <= min(batch, worth):
+        # Few samples, which most often take one descent: nothing is shared out.
+        problem = problem_at(unsolved)
+        limits = _limits(problem, accuracy)
+        descent = _begin(methods.pop(0), linear, limits)
+        results = driver.solve(problem, descent, limits, guess)
+        report(size, assembly.n_law_points, linear)
+        solved = results[RESIDUAL] <= limits.residual
+        if solved.all():
+            return _solutions(results, scale, limits.residual, accuracy, linear)
+        limit = np.full(size, limits.residual)
+        unsolved = np.flatnonzero(~solved)
+    else:
+        results = np.zeros((RESULT_ROWS, size))
+        results[RESIDUAL] = np.inf
+        limit = np.zeros(size)
 
     def store(index, new, limits: Limits) -> None:
         new[EVALUATIONS] += results[EVALUATIONS, index]
@@ -129,12 +149,6 @@ def solve(
                 store(index[i[solved]], ended[:, solved], limits)
                 results[EVALUATIONS, index[i[~solved]]] += ended[EVALUATIONS, ~solved]
 
-    unsolved = np.arange(size)
-    methods: list = [QUICK, *WALKS, *SLOW]
-    if guess is not None:
-        methods.insert(0, WARM)
-        with np.errstate(over="ignore"):
-            guess = guess / scale
     for method in methods:
         active = unsolved
         if method is WARM:
@@ -148,14 +162,22 @@ def solve(
         if solved.all():
             break
         unsolved = np.flatnonzero(~solved)
+    limit = float(limit.max(initial=0.0))
+    return _solutions(results, scale, limit, accuracy, linear)
+
+
+def _solutions(
+    results: np.ndarray,
+    scale: np.ndarray,
+    limit: float,
+    accuracy: Accuracy,
+    linear: bool,
+) -> Solutions:
+    """Return the solutions in the rows of results."""
     residual, evaluations, slowest = results[RESIDUAL:]
     stuck = (slowest < STUCK_BELOW * accuracy.rounding) & (not linear)
     return Solutions(
-        results[:3] * scale,
-        residual,
-        evaluations.astype(int),
-        stuck,
-        float(limit.max(initial=0.0)),
+        results[:3] * scale, residual, evaluations.astype(int), stuck, limit
     )
 
 
@@ -170,9 +192,10 @@ def compiled_driver() -> ModuleType:
 def _begin(descent: Descent, linear: bool, limits: Limits) -> Descent:
     """Return the descent with the rounding of its first level, which is also the last
     level in a linear medium."""
-    if linear:
-        return descent._replace(first=limits.rounding)
-    return descent._replace(first=max(descent.first, limits.rounding))
+    first = limits.rounding
+    if not linear:
+        first = max(descent.first, first)
+    return Descent(first, *descent[1:])
 
 
 def _limits(problem: Problem, accuracy: Accuracy) -> Limits:
