@@ -62,6 +62,7 @@ def build(folder: Path, root: Path) -> Path:
     for name, kernel in (
         ("solve", kernels.kernel(Terms)),
         ("net_at", kernels.net_kernel(Terms)),
+        ("velocities", kernels.chain_kernel(Terms)),
     ):
         code.export(name, kernel.signatures[0])(kernel.py_func)
     code.compile()

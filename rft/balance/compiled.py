@@ -24,10 +24,11 @@ NO_TERMS = np.zeros((0, 0, 3))
 
 class Kernels(NamedTuple):
     """Compiled functions for one class of law records: the solver, and the sum of
-    forces at given velocities (`rft.balance.kernels`)."""
+    forces at given velocities, and the solver of chains (`rft.balance.kernels`)."""
 
     solve: Callable
     net_at: Callable
+    velocities: Callable
 
 
 @functools.cache
@@ -36,11 +37,13 @@ def kernels_of(Law: type) -> Kernels:
     numba is loaded, and compiles each when it is called first."""
     if ahead.has(Law):
         built = ahead.library()
-        return Kernels(built.solve, built.net_at)
+        return Kernels(built.solve, built.net_at, built.velocities)
 
     from rft.balance import kernels
 
-    return Kernels(kernels.kernel(Law), kernels.net_kernel(Law))
+    return Kernels(
+        kernels.kernel(Law), kernels.net_kernel(Law), kernels.chain_kernel(Law)
+    )
 
 
 def plain(x) -> np.ndarray:

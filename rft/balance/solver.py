@@ -105,7 +105,7 @@ def solve(
         # Few samples, which most often take one descent: nothing is shared out.
         problem = problem_at(unsolved)
         limits = _limits(problem, accuracy)
-        descent = _begin(methods.pop(0), linear, limits)
+        descent = begin(methods.pop(0), linear, limits)
         results = driver.solve(problem, descent, limits, guess)
         report(size, assembly.n_law_points, linear)
         solved = results[RESIDUAL] <= limits.residual
@@ -135,7 +135,7 @@ def solve(
             if method is WARM:
                 first = guess[:, index]
             n_new = problem.n_samples - np.count_nonzero(results[EVALUATIONS, index])
-            descent = _begin(method, linear, limits)
+            descent = begin(method, linear, limits)
             store(index, driver.solve(problem, descent, limits, first), limits)
             if n_new:
                 report(n_new, assembly.n_law_points, linear)
@@ -189,7 +189,7 @@ def compiled_driver() -> ModuleType:
     return compiled
 
 
-def _begin(descent: Descent, linear: bool, limits: Limits) -> Descent:
+def begin(descent: Descent, linear: bool, limits: Limits) -> Descent:
     """Return the descent with the rounding of its first level, which is also the last
     level in a linear medium."""
     first = limits.rounding
@@ -201,11 +201,17 @@ def _begin(descent: Descent, linear: bool, limits: Limits) -> Descent:
 def _limits(problem: Problem, accuracy: Accuracy) -> Limits:
     """Return the limits of a problem, whose residual allows for roundoff of the largest
     forces."""
-    largest = max(1.0, problem.lateral_drag / problem.axial_drag)
-    residual = accuracy.tolerance + 1e-14 * largest
+    rounding, residual, *_ = limits_of(problem, accuracy)
     if problem.momentum_rate is not None:
         frame = problem.frame
         m = problem.momentum_rate
         inertia = m.rate * m.strength * frame.speed_scale / frame.force_scale
         residual += 1e-14 * np.max(inertia)
+    return Limits(rounding, float(residual))
+
+
+def limits_of(drag: Problem | Assembly, accuracy: Accuracy) -> Limits:
+    """Return the limits of a massless body with the largest forces of its drag."""
+    largest = max(1.0, drag.lateral_drag / drag.axial_drag)
+    residual = accuracy.tolerance + 1e-14 * largest
     return Limits(float(accuracy.rounding), float(residual))

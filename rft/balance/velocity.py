@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rft.balance.backend import check
+from rft.balance.backend import check, solves_compiled
+from rft.balance.chains import ChainBalance, chain_numbers
 from rft.balance.solver import Accuracy, Solutions, solve
 from rft.bodies.base import Body, body_size, joint_speed
 from rft.bodies.pieces import PIECES
@@ -18,10 +19,10 @@ from rft.core.premise import negation
 from rft.core.refusal import Refusal, require
 from rft.effects.base import Effect, broken_premises, engine
 from rft.effects.contact import Assembly, Problem, assemble
+from rft.formulas.newton import UNCONVERGED
 from rft.laws.base import Medium, cached_if_immutable
 
 STATUSES = np.array(["sliding", "stuck", "unconverged"])
-UNCONVERGED = 2
 SAMPLES_TOGETHER = 2**20  # that are solved at once, for the memory they take
 LEAST_RATE = 1e-100  # other than 0
 FEW = 16  # numbers, which Python compares sooner than NumPy
@@ -148,6 +149,8 @@ def body_velocity(
     (array([ 0.015 ,  0.0161, -0.1929]), 'sliding')
     """
     check(backend)
+    if effects != ():
+        engine(effects)  # refuses what is no list of effects
     prepared = _prepared(
         medium,
         body,
@@ -203,7 +206,6 @@ class BodyVelocity:
         pieces: int = PIECES,
         backend: str = "auto",
     ):
-        effects = tuple(effects)
         if effects != () and engine(effects) != "algebraic":
             broken = negation(broken_premises(effects))
             raise Refusal(
@@ -220,6 +222,10 @@ class BodyVelocity:
         self._accuracy = Accuracy(regularisation, tolerance)
         self._threads = threads
         self._backend = backend
+        numbers = chain_numbers(self._assembly, self._accuracy)
+        self._chain = None
+        if numbers is not None:
+            self._chain = ChainBalance(self._assembly, numbers, self._accuracy)
 
     def __call__(
         self, alpha: ArrayLike, alphadot: ArrayLike, start: ArrayLike | None = None
@@ -233,7 +239,10 @@ class BodyVelocity:
         alpha = alpha.reshape(-1, self._body.joints)
         alphadot = alphadot.reshape(-1, self._body.joints)
         size = len(alpha)
-        if size <= SAMPLES_TOGETHER:
+        compiled = solves_compiled(self._backend, self._assembly.law)
+        if self._chain is not None and compiled and guess is None and size:
+            found = self._of_chain(alpha, alphadot)
+        elif size <= SAMPLES_TOGETHER:
             found = self._solution(self._assembly, alpha, alphadot, guess)
         else:
             found = Solution(
@@ -255,6 +264,18 @@ class BodyVelocity:
         return Solution(
             found.xi.reshape(*batch, 3), *[x.reshape(batch) for x in found[1:]]
         )
+
+    def _of_chain(self, alpha: np.ndarray, alphadot: np.ndarray) -> Solution:
+        """Return the solution at shapes and rates (B, joints) of a chain; what one
+        descent leaves unsolved is solved as of any body."""
+        fields, unsolved = self._chain.solve(alpha, alphadot, self._threads)
+        found = Solution(*fields)
+        if unsolved:
+            i = np.flatnonzero(found.code == UNCONVERGED)
+            rest = self._solution(self._assembly, alpha[i], alphadot[i], None)
+            for whole, values in zip(found, rest):
+                whole[i] = values
+        return found
 
     def _solution(
         self,

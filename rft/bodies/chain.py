@@ -69,10 +69,11 @@ class Chain(Links):
         """Number of shape variables: joints between links, or modes."""
         if self.modes is None:
             return len(self.lengths) - 1
-        return len(self._mode_rows)
+        return len(self.mode_rows)
 
     @cached_property
-    def _mode_rows(self) -> np.ndarray:
+    def mode_rows(self) -> np.ndarray:
+        """The modes, (joints, n - 1): rows of joint angles."""
         return mode_rows(self.modes, self.waves, len(self.lengths))
 
     def joint_angles(self, shape: np.ndarray) -> np.ndarray:
@@ -80,7 +81,7 @@ class Chain(Links):
         of rates."""
         if self.modes is None:
             return shape
-        return self._mode_rows.T @ shape
+        return self.mode_rows.T @ shape
 
     @property
     def shape_labels(self) -> tuple[tuple[str, str], ...]:
@@ -100,9 +101,9 @@ class Chain(Links):
         k, _, size = differences.shape
         x = np.zeros((k, len(self.lengths), size))
         np.add.accumulate(differences, 1, out=x[:, 1:])
-        if self._link is None:
+        if self.frame_link is None:
             return x - (self.fractions @ x)[:, None]
-        return x - x[:, self._link, None]
+        return x - x[:, self.frame_link, None]
 
     @cached_property
     def _sums(self) -> np.ndarray:

@@ -27,6 +27,7 @@ from geomech import scenes
 from geomech.mathematics.gaits import Ellipse
 from rft import (
     Backbone,
+    BodyVelocity,
     Chain,
     DisturbedGround,
     EndCaps,
@@ -170,6 +171,28 @@ def test_a_sample_alone_has_the_digits_that_it_has_among_others(body, effects):
     common = balance.QUICK, Limits(1e-6, 1e-10), None
     alone = [solve(problem.take(np.array([i])), *common) for i in range(40)]
     np.testing.assert_array_equal(np.concatenate(alone, 1), solve(problem, *common))
+
+
+@compiled
+@pytest.mark.parametrize("medium", [GLASS, Both()], ids=["dry", "both"])
+def test_one_prepared_chain_has_the_digits_of_body_velocity(medium):
+    """And those that it has among others, at rest and on both sides of a block."""
+    body = Chain((0.8, 1.3, 1.0, 0.7), 0.3, modes=((1.4, 0.3, -0.5), (-0.2, 0.9, 2.1)))
+    velocity = BodyVelocity(medium, body, backend="numba")
+    rng = np.random.default_rng(12)
+    alpha, alphadot = rng.uniform(-1, 1, (2, 1100, 2))
+    alphadot[3] = 0.0
+    among = velocity(alpha, alphadot)
+    asked = medium, body, alpha, alphadot
+    for a, b in zip(among, body_velocity(*asked, backend="numba")):
+        np.testing.assert_array_equal(a, b)
+    for i in (0, 3, 1023, 1024, 1099):
+        alone = velocity(alpha[i], alphadot[i])
+        for a, b in zip(alone, among):
+            np.testing.assert_array_equal(a, b[i])
+    plain = body_velocity(*asked, backend="numpy")
+    assert (plain.code == among.code).all()
+    assert apart(among, plain, np.maximum(abs(alphadot), 0.01), body).max() < 1e-11
 
 
 class Sheared:
@@ -460,14 +483,17 @@ def test_kernels_built_ahead_serve_closed_laws_without_numba(monkeypatch):
 @compiled
 def test_code_is_compiled_beforehand(capsys):
     from rft.balance.compiled import kernels_of
-    from rft.balance.kernels import kernel
+    from rft.balance.kernels import chain_kernel, kernel
 
     runpy.run_module("rft", run_name="__main__")
     assert capsys.readouterr().out.startswith("compiled code is kept in ")
-    kernel.cache_clear()
-    kernels_of.cache_clear()
+    for function in (kernel, chain_kernel, kernels_of):
+        function.cache_clear()
     body_velocity(GLASS, BODY, (0.4, -0.7), (1.0, 0.3), backend="numba")
-    assert sum(kernel(type(record(GLASS))).stats.cache_misses.values()) == 0
+    asked = {"start": np.zeros(3), "backend": "numba"}
+    body_velocity(GLASS, BODY, (0.4, -0.7), (1.0, 0.3), **asked)
+    for function in (kernel, chain_kernel):
+        assert sum(function(type(record(GLASS))).stats.cache_misses.values()) == 0
 
 
 @dataclasses.dataclass(frozen=True)

@@ -21,7 +21,15 @@ from geomech.mathematics.systems import Solver, Swimmer
 from geomech.mathematics.tiers.direct import direct
 from geomech.scenes import load
 from geomech.studies.scene_tables import SceneTables
-from rft import CATALOGUE, Backbone, Chain, Transient, body_velocity, time_steps
+from rft import (
+    CATALOGUE,
+    Backbone,
+    BodyVelocity,
+    Chain,
+    Transient,
+    body_velocity,
+    time_steps,
+)
 from rft.balance.backend import preferring
 
 pytestmark = [
@@ -121,6 +129,27 @@ def test_against_a_loop_of_fsolve():
     print(f"  the loop says that it fails in {failed:.0%}", end=", ")
     print(f"is off by more than 0.01 in {np.mean(off > 0.01):.0%}")
     assert (solution.status != "unconverged").all()
+
+
+@pytest.mark.skipif("numba" not in backends(), reason="numba is missing")
+def test_one_velocity_against_a_plain_loop():
+    """By `body_velocity`, by a call that is prepared, and by the plain loop for one
+    sample, which checks and assembles nothing."""
+    asked_of = GLASS, MIDDLE
+    how = {"backend": "numba"}
+    one = [0.5, 0.3], [1.0, 0.0]
+    arrays = [np.array([x]) for x in one]
+    asked = {
+        "plain compiled loop": functools.partial(peers.plain_loop(), *arrays),
+        "body_velocity": functools.partial(body_velocity, *asked_of, *one, **how),
+        "prepared": functools.partial(BodyVelocity(*asked_of, **how), *one),
+    }
+    took = in_turn({k: functools.partial(repeated, f, ()) for k, f in asked.items()})
+    for name, seconds in took.items():
+        ratio = seconds / took["plain compiled loop"]
+        print(f"\n{name:20} {1e6 * seconds / CALLS:7.1f} us, ratio {ratio:.1f}", end="")
+    assert took["prepared"] < 4 * took["plain compiled loop"]
+    assert took["body_velocity"] < 6 * took["plain compiled loop"]
 
 
 @pytest.mark.parametrize("gait", [Circle(), Butterfly()])
