@@ -40,7 +40,7 @@ WARM = Descent(0.0, 0.0, 0.0, np.inf, 12.0)  # from a guess, on the last level a
 # Walks along a curve: intended size of a step's first correction, most evaluations. A
 # force law alone needs no more than these; the slow descents are for effects and
 # quadrature rules whose kinks are not rounded off.
-WALKS = ((0.2, 150), (0.02, 600))
+WALKS = ((0.2, 150), (0.02, 600), (0.005, 2000))
 SLOW = (
     Descent(0.1, 0.1, 1e-4, 1e3, 150.0),
     Descent(0.3, 0.3, 1e-6, np.inf, 500.0),
@@ -88,10 +88,11 @@ def solve(
     report = listener()
     linear = assembly.linear
     batch = max(1, ELEMENTS_TOGETHER // assembly.n_law_points)
-    driver = arrays
+    descend_all, walk_all = arrays.solve, follow
     worth = 2 * batch  # samples that pay for a thread
     if solves_compiled(backend, assembly.law):
-        driver = compiled_driver()
+        compiled = compiled_driver()
+        descend_all, walk_all = compiled.solve, compiled.follow
         worth = COMPILED_WORTH
         batch = 4 * batch
     methods: list = [QUICK, *WALKS, *SLOW]
@@ -106,7 +107,7 @@ def solve(
         problem = problem_at(unsolved)
         limits = _limits(problem, accuracy)
         descent = begin(methods.pop(0), linear, limits)
-        results = driver.solve(problem, descent, limits, guess)
+        results = descend_all(problem, descent, limits, guess)
         report(size, assembly.n_law_points, linear)
         solved = results[RESIDUAL] <= limits.residual
         if solved.all():
@@ -136,7 +137,7 @@ def solve(
                 first = guess[:, index]
             n_new = problem.n_samples - np.count_nonzero(results[EVALUATIONS, index])
             descent = begin(method, linear, limits)
-            store(index, driver.solve(problem, descent, limits, first), limits)
+            store(index, descend_all(problem, descent, limits, first), limits)
             if n_new:
                 report(n_new, assembly.n_law_points, linear)
 
@@ -144,7 +145,7 @@ def solve(
         for index in split(share, math.ceil(share.size / batch)):
             problem = problem_at(index)
             limits = _limits(problem, accuracy)
-            for i, ended in follow(problem, limits, driver.nets, *method):
+            for i, ended in walk_all(problem, limits, *method):
                 solved = ended[RESIDUAL] <= limits.residual
                 store(index[i[solved]], ended[:, solved], limits)
                 results[EVALUATIONS, index[i[~solved]]] += ended[EVALUATIONS, ~solved]

@@ -37,7 +37,7 @@ from rft import (
     body_velocity,
     time_steps,
 )
-from rft.balance import ahead, backend
+from rft.balance import ahead, backend, path
 from rft.balance import solver as balance
 from rft.balance.backend import Note
 from rft.bodies import Elements
@@ -45,6 +45,7 @@ from rft.core.premise import Premise
 from rft.core.refusal import Refusal
 from rft.effects import Effect
 from rft.effects.contact import assemble
+from rft.formulas.momentum import MomentumRate
 from rft.formulas.newton import Limits
 from rft.formulas.vectors import formula, sqrt
 from rft.laws.base import TermLaw
@@ -193,6 +194,37 @@ def test_one_prepared_chain_has_the_digits_of_body_velocity(medium):
     plain = body_velocity(*asked, backend="numpy")
     assert (plain.code == among.code).all()
     assert apart(among, plain, np.maximum(abs(alphadot), 0.01), body).max() < 1e-11
+
+
+@compiled
+@pytest.mark.parametrize("mass", [0.0, 0.3])
+@pytest.mark.parametrize(
+    ("medium", "effects"),
+    [
+        (GLASS, ()),
+        (Both(), (SkinFriction(),)),
+        (GLASS, (EndCaps(radius=0.06, tail=1.0), TowedSled(1.0, 0.3))),
+    ],
+    ids=["dry", "both", "points"],
+)
+def test_both_walk_along_the_same_curves(medium, effects, mass):
+    from rft.balance import compiled as fast
+
+    assembly = assemble(medium, BODY, sized(effects))
+    alpha, alphadot = np.random.default_rng(9).uniform(-2.5, 2.5, (2, 2, 20))
+    problem = assembly.problem(alpha, alphadot)
+    if mass:
+        past = np.full((3, 20), 0.01)
+        rate = MomentumRate(np.ones((1, 1)), past, past, past, np.full((1, 1), mass))
+        problem = problem._replace(momentum_rate=rate)
+    asked = problem, Limits(1e-6, 1e-10), 0.2, 400
+    wanted = np.empty((6, 20))
+    for i, rows in path.follow(*asked):
+        wanted[:, i] = rows
+    ((i, found),) = fast.follow(*asked)
+    assert np.isfinite(wanted[3]).all() and np.isfinite(found[3]).all()
+    np.testing.assert_allclose(found[:3, i], wanted[:3], rtol=0, atol=1e-9)
+    assert np.mean(found[4] == wanted[4]) > 0.9
 
 
 class Sheared:
