@@ -40,7 +40,7 @@ WARM = Descent(0.0, 0.0, 0.0, np.inf, 12.0)  # from a guess, on the last level a
 # Walks along a curve: intended size of a step's first correction, most evaluations. A
 # force law alone needs no more than these; the slow descents are for effects and
 # quadrature rules whose kinks are not rounded off.
-WALKS = ((0.2, 150), (0.02, 600), (0.005, 2000))
+WALKS = ((0.2, 150), (0.02, 600), (0.005, 2000), (0.001, 5000))
 SLOW = (
     Descent(0.1, 0.1, 1e-4, 1e3, 150.0),
     Descent(0.3, 0.3, 1e-6, np.inf, 500.0),

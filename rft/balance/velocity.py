@@ -444,11 +444,12 @@ def checked_motion(body, alpha, alphadot) -> list[np.ndarray]:
     if alpha.shape == alphadot.shape:
         return [alpha, alphadot]
     try:
-        return np.broadcast_arrays(alpha, alphadot)
+        shape = np.broadcast_shapes(alpha.shape, alphadot.shape)
     except ValueError:
         raise Refusal(
             f"alpha {alpha.shape} and alphadot {alphadot.shape} do not broadcast"
         ) from None
+    return [np.broadcast_to(alpha, shape), np.broadcast_to(alphadot, shape)]
 
 
 def _checked(
