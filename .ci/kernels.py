@@ -51,7 +51,7 @@ def build(folder: Path, root: Path) -> Path:
     from rft.laws.records import Terms
 
     # Kernels know their types once they are called; solutions of this law fold at this
-    # shape, so that both are.
+    # shape, so that all are.
     law = Granular(8.0, math.radians(35.0))
     shape = (-1.47053323, -1.9356507)
     rate = (-0.99735926, -0.07262584)

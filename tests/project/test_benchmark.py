@@ -26,11 +26,13 @@ from rft import (
     Backbone,
     BodyVelocity,
     Chain,
+    Granular,
     Transient,
     body_velocity,
     time_steps,
 )
 from rft.balance.backend import preferring
+from rft.balance.solver import QUICK
 
 pytestmark = [
     pytest.mark.benchmark,
@@ -150,6 +152,25 @@ def test_one_velocity_against_a_plain_loop():
         print(f"\n{name:20} {1e6 * seconds / CALLS:7.1f} us, ratio {ratio:.1f}", end="")
     assert took["prepared"] < 4 * took["plain compiled loop"]
     assert took["body_velocity"] < 6 * took["plain compiled loop"]
+
+
+@pytest.mark.skipif("numba" not in backends(), reason="numba is missing")
+def test_hard_samples_take_little_of_a_batch():
+    """Batches of a law far from monotone, whose curves of solutions fold, over the same
+    without the samples that are followed along their curves."""
+    law = Granular(8.0, np.radians(35.0))
+    rng = np.random.default_rng(5)
+    alpha = rng.uniform(-3, 3, (20_000, 2))
+    alphadot = rng.normal(size=(20_000, 2))
+    velocity = BodyVelocity(law, Chain(), backend="numba", threads=1)
+    walked = velocity(alpha, alphadot).checked().iterations > QUICK.budget
+    took = in_turn({
+        "all": functools.partial(velocity, alpha, alphadot),
+        "without": functools.partial(velocity, alpha[~walked], alphadot[~walked]),
+    })  # fmt: skip
+    ratio = took["all"] / took["without"]
+    print(f"\n{walked.sum()} of 20,000 are walked: ratio {ratio:.2f}")
+    assert walked.sum() > 0 and ratio < 1.5
 
 
 @pytest.mark.parametrize("gait", [Circle(), Butterfly()])
