@@ -138,9 +138,9 @@ class ChainBalance:
         and return the number of samples that it leaves unsolved."""
         assembly = self._assembly
         velocities = kernels_of(type(assembly.law)).velocities
-        moving, unsolved = velocities(
-            *self._arguments, plain(alpha), plain(alphadot), found
-        )
+        # Copies: kernels take contiguous arrays that may be written to.
+        motion = np.array(alpha, order="C"), np.array(alphadot, order="C")
+        moving, unsolved = velocities(*self._arguments, *motion, found)
         if moving > unsolved:
             report(moving - unsolved, assembly.n_law_points, assembly.linear)
         return unsolved
