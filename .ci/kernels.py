@@ -47,11 +47,11 @@ def build(folder: Path, root: Path) -> Path:
         warnings.simplefilter("ignore")  # that numba may replace pycc one day
         from numba.pycc import CC
     from rft import Chain, Granular, body_velocity
-    from rft.balance import kernels
+    from rft.balance import kernels, walks
     from rft.laws.records import Terms
 
     # Kernels know their types once they are called; solutions of this law fold at this
-    # shape, so that both are.
+    # shape, so that all are.
     law = Granular(8.0, math.radians(35.0))
     shape = (-1.47053323, -1.9356507)
     rate = (-0.99735926, -0.07262584)
@@ -61,7 +61,8 @@ def build(folder: Path, root: Path) -> Path:
     code.target_cpu = PROCESSOR
     for name, kernel in (
         ("solve", kernels.kernel(Terms)),
-        ("net_at", kernels.net_kernel(Terms)),
+        ("velocities", kernels.chain_kernel(Terms)),
+        ("walk", walks.walk_kernel(Terms)),
     ):
         code.export(name, kernel.signatures[0])(kernel.py_func)
     code.compile()

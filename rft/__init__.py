@@ -7,7 +7,7 @@ import pkgutil
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rft.balance.velocity import Solution, body_velocity
+    from rft.balance.velocity import BodyVelocity, Solution, body_velocity
     from rft.bodies import Backbone, Body, Chain, ConstantCurvature, Serpenoid
     from rft.core.refusal import Refusal
     from rft.effects import (
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 # not resumed.
 SOLVER = 13
 _NAMES = {
-    "rft.balance.velocity": "Solution body_velocity",
+    "rft.balance.velocity": "BodyVelocity Solution body_velocity",
     "rft.bodies": "Backbone Body Chain ConstantCurvature Serpenoid",
     "rft.effects": "BodyInertia DepthProfile DisturbedGround EndCaps GrainInertia "
     "SkinFriction Slope TowedSled Transient",
@@ -63,6 +63,7 @@ __all__ = [
     "Backbone",
     "Body",
     "BodyInertia",
+    "BodyVelocity",
     "Chain",
     "ConstantCurvature",
     "Coulomb",

@@ -10,11 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.balance import ahead
-from rft.effects.contact import NO_FACTOR, Problem, mapped
+from rft.effects.contact import NO_FACTOR, Problem
 from rft.formulas.momentum import frame_inertia
-from rft.formulas.newton import RESULT_ROWS, Descent, Limits, Net, with_momentum
+from rft.formulas.newton import RESULT_ROWS, Descent, Limits
 
-NET_ROWS = 15  # of the sums of forces: the numbers of a `Net`
 DOUBLE = np.dtype(float)
 NO_GUESS = np.zeros((3, 0))
 NO_ROWS = np.zeros((0, 1, 1))
@@ -23,11 +22,12 @@ NO_TERMS = np.zeros((0, 0, 3))
 
 
 class Kernels(NamedTuple):
-    """Compiled functions for one class of law records: the solver, and the sum of
-    forces at given velocities (`rft.balance.kernels`)."""
+    """Compiled functions for one class of law records: a descent, a descent of chains
+    (`rft.balance.kernels`), and walks (`rft.balance.walks`)."""
 
     solve: Callable
-    net_at: Callable
+    velocities: Callable
+    walk: Callable
 
 
 @functools.cache
@@ -36,11 +36,13 @@ def kernels_of(Law: type) -> Kernels:
     numba is loaded, and compiles each when it is called first."""
     if ahead.has(Law):
         built = ahead.library()
-        return Kernels(built.solve, built.net_at)
+        return Kernels(built.solve, built.velocities, built.walk)
 
-    from rft.balance import kernels
+    from rft.balance import kernels, walks
 
-    return Kernels(kernels.kernel(Law), kernels.net_kernel(Law))
+    return Kernels(
+        kernels.kernel(Law), kernels.chain_kernel(Law), walks.walk_kernel(Law)
+    )
 
 
 def plain(x) -> np.ndarray:
@@ -106,33 +108,34 @@ def load_arguments(problem: Problem) -> tuple:
     return tuple(map(kernel_number, p.law)), sides, points, terms, frame, additions
 
 
-def nets(
-    problem: Problem, v: np.ndarray, rounding: np.ndarray, xi: np.ndarray
-) -> np.ndarray:
-    """Return the entries of `Net` as `rft.balance.arrays.nets` does."""
-    p = problem
-    out = np.empty((NET_ROWS, problem.n_samples))
-    kernels_of(type(p.law)).net_at(load_arguments(p), plain(v), rounding, out)
-    out = out.reshape(5, 3, -1)
-    if p.momentum_rate is None:
-        return out
-    mass = mapped(lambda x: x[0], frame_inertia(p.sides.elements, p.momentum_rate))
-    net = Net(*map(tuple, out))
-    return np.array(with_momentum(net, *xi, mass, p.law_speed_scale[0]))
-
-
 def solve(
     problem: Problem, descent: Descent, limits: Limits, guess: np.ndarray | None
 ) -> np.ndarray:
     """Solve all samples by one descent as `rft.balance.arrays.solve` does."""
     p = problem
     out = np.empty((RESULT_ROWS, problem.n_samples))
-    mass = NO_ROWS
-    if p.momentum_rate is not None:
-        mass = stacked(frame_inertia(p.sides.elements, p.momentum_rate))
     if guess is None:
         guess = NO_GUESS
     guess = plain(guess)
     arguments = load_arguments(p)
-    kernels_of(type(p.law)).solve(arguments, mass, guess, descent, limits, out)
+    kernels_of(type(p.law)).solve(arguments, mass_of(p), guess, descent, limits, out)
     return out
+
+
+def follow(
+    problem: Problem, limits: Limits, correction: float, budget: int
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Solve all samples as `rft.balance.path.follow` does."""
+    p = problem
+    out = np.empty((RESULT_ROWS, problem.n_samples))
+    walk = kernels_of(type(p.law)).walk
+    arguments = load_arguments(p)
+    walk(arguments, mass_of(p), p.is_scale_free, limits, correction, budget, out)
+    return [(np.arange(problem.n_samples), out)]
+
+
+def mass_of(problem: Problem) -> np.ndarray:
+    """Return the rows of `Inertia` (13, 1, B) of a problem; none without mass."""
+    if problem.momentum_rate is None:
+        return NO_ROWS
+    return stacked(frame_inertia(problem.sides.elements, problem.momentum_rate))

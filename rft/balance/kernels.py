@@ -20,7 +20,13 @@ from rft.balance.cache import cached
 from rft.bodies.base import Elements
 from rft.formulas.link import Factor, Incline, Memory, point_load, side_load
 from rft.formulas.newton import (
+    EVALUATIONS,
+    RESIDUAL,
     RESULT_ROWS,
+    SLIDING,
+    SLOWEST,
+    STUCK,
+    UNCONVERGED,
     Frame,
     Inertia,
     Iterate,
@@ -66,7 +72,9 @@ SUM_ROWS = 16
 
 WEIGHT = 5  # place in `Elements`
 V_T = 6  # place in `Elements`
+FORCE_SCALE = 2  # place in `Frame`
 SPEED_SCALE = 3  # place in `Frame`
+LAW_SPEED = 4  # place after `Frame`
 ROUNDING_NEXT = 7  # place in `Iterate`
 (read_elements, _), (read_factor, _), (read_memory, _), (read_incline, _) = map(
     record_access, (Elements, Factor, Memory, Incline)
@@ -302,48 +310,196 @@ def kernel(Law: type):
     return cached(solve, f"the force balance for laws of the form {Law.__name__}")
 
 
+# Rows of the shape of a chain: the heading of each link, its centre x + i y, and the
+# rates of these.
+HEADING, TURN, X, Y, V_X, V_Y = range(6)
+CHAINS_TOGETHER = 1024  # samples whose links are computed before they are solved
+
+
+@register_jitable
+def joint_angle(chain, shape, k):
+    """Return joint angle k of a shape, or its rate."""
+    if len(chain.modes) == 0:
+        return shape[k]
+    angle = 0.0
+    for j in range(len(shape)):
+        angle += chain.modes[j, k] * shape[j]
+    return angle
+
+
+@register_jitable
+def joint_speed(chain, rate):
+    """Return the size of the joint rates."""
+    speed2 = 0.0
+    for k in range(len(chain.fractions) - 1):
+        angle = joint_angle(chain, rate, k)
+        speed2 += angle * angle
+    return np.sqrt(speed2)
+
+
+@register_jitable
+def to_frame(chain, rows, j):
+    """Subtract the frame's value from the values of the links in a row."""
+    # A loop, since an expression with arrays takes seconds more to compile.
+    n = rows.shape[1]
+    value = 0.0
+    if chain.frame_link >= 0:
+        value = rows[j, chain.frame_link]
+    else:
+        for k in range(n):
+            value += chain.fractions[k] * rows[j, k]
+    for k in range(n):
+        rows[j, k] -= value
+
+
+@register_jitable
+def pose_links(chain, shape, rate, rows):
+    """Write the links in the body frame at a shape and its rate, (joints,) each, to
+    ``rows`` (6, n), as `rft.bodies.Chain` computes them."""
+    n = rows.shape[1]
+    rows[HEADING, 0] = 0.0
+    rows[TURN, 0] = 0.0
+    for k in range(n - 1):
+        rows[HEADING, k + 1] = rows[HEADING, k] + joint_angle(chain, shape, k)
+        rows[TURN, k + 1] = rows[TURN, k] + joint_angle(chain, rate, k)
+    to_frame(chain, rows, HEADING)
+    to_frame(chain, rows, TURN)
+    x = y = v_x = v_y = 0.0  # of the joint between links
+    for k in range(n):
+        half = 0.5 * chain.fractions[k]
+        c = half * np.cos(rows[HEADING, k])
+        s = half * np.sin(rows[HEADING, k])
+        turn = rows[TURN, k]
+        rows[X, k] = x + c
+        rows[Y, k] = y + s
+        rows[V_X, k] = v_x - turn * s
+        rows[V_Y, k] = v_y + turn * c
+        x += 2.0 * c
+        y += 2.0 * s
+        v_x -= 2.0 * turn * s
+        v_y += 2.0 * turn * c
+    for j in range(X, V_Y + 1):
+        to_frame(chain, rows, j)
+
+
+@register_jitable
+def write_links(chain, rows, elements, frame, i):
+    """Write the links in ``rows`` to column i of the arrays of `Elements`, and the mean
+    of their centres to the first two of `Frame`."""
+    c, s, r_t, r_n, half, _, v_t, v_n, v_w = elements
+    mean_x = 0.0
+    mean_y = 0.0
+    for k in range(rows.shape[1]):
+        x = rows[X, k]
+        y = rows[Y, k]
+        c[k, i] = np.cos(rows[HEADING, k])
+        s[k, i] = np.sin(rows[HEADING, k])
+        r_t[k, i] = x * s[k, i] - y * c[k, i]
+        r_n[k, i] = x * c[k, i] + y * s[k, i]
+        v_t[k, i] = rows[V_X, k] * c[k, i] + rows[V_Y, k] * s[k, i]
+        v_n[k, i] = rows[V_Y, k] * c[k, i] - rows[V_X, k] * s[k, i]
+        v_w[k, i] = rows[TURN, k] * half[k, 0]
+        mean_x += chain.fractions[k] * x
+        mean_y += chain.fractions[k] * y
+    frame[0][0, i] = mean_x
+    frame[1][0, i] = mean_y
+
+
 @functools.cache
-def net_kernel(Law: type):
-    """Return the compiled sum of forces at given velocities of all elements, for one
-    class of law records."""
-    evaluate = evaluator(Law)
+def chain_kernel(Law: type):
+    """Return the compiled solver of chains without effects, from shapes and rates to
+    velocities, for one class of law records."""
+    solve = kernel(Law)
 
     @njit(nogil=True, error_model="numpy")
-    def net_at(loads, v, rounding, out):
-        numbers, sides, points, point_terms, frame, additions = loads
-        law = Law(*numbers)
-        n = len(sides[0][0])
-        size = v.shape[2]
-        rows = np.ones((v.shape[1], ROWS, WIDTH))
-        v_lanes = np.zeros((v.shape[1], 3, WIDTH))
-        v_next = np.zeros_like(v_lanes)
-        samples = np.zeros((SAMPLE_ROWS, WIDTH))
-        sums = np.zeros((SUM_ROWS, WIDTH))
-        samples[SPEED] = 1.0
-        for first in range(0, size, WIDTH):
-            count = min(WIDTH, size - first)
-            for lane in range(count):
-                i = first + lane
-                fill_contact(rows[:n], sides, 1, lane, lane + 1, i)
-                fill_contact(rows[n:], points, 1, lane, lane + 1, i)
-                fill(samples, FRAME, frame, 0, lane, i)
-                samples[ITERATE + ROUNDING_NEXT, lane] = rounding[i]
-                v_lanes[:, :, lane] = v[:, :, i].T
-            iterate = read_iterate(samples, ITERATE)
-            speed = load(samples, SPEED)
-            evaluate(
-                law,
-                point_terms,
-                n,
-                rows,
-                v_lanes,
-                v_next,
-                iterate,
-                speed,
-                additions,
-                False,
-                sums,
-            )
-            out[:, first : first + count] = sums[:SLOWEST2, :count]
+    def velocities(numbers, chain, additions, descent, limits, alpha, alphadot, found):
+        """Write the fields of a `Solution` at shapes and rates (B, joints) to arrays,
+        and return the number of samples whose joints move, and of those among them
+        that the descent leaves unsolved.
 
-    return cached(net_at, f"walks along solutions for laws of the form {Law.__name__}")
+        additions: `Additions`, none of which applies."""
+        xi, residual, code, evaluations = found
+        n = len(chain.fractions)
+        size = len(alpha)
+        rows = np.empty((6, n))
+        half = np.empty((n, 1))
+        weight = np.empty((n, 1))
+        for k in range(n):
+            half[k, 0] = 0.5 * chain.fractions[k]
+            weight[k, 0] = 2.0 * half[k, 0]
+        none = np.zeros((0, 1, 1))
+        points = np.zeros((9, 0, 1)), none, none, none
+        terms = np.zeros((0, 0, 3))
+        guess = np.zeros((3, 0))
+        moving = np.empty(min(size, CHAINS_TOGETHER), np.int64)
+        n_moving = 0
+        unsolved = 0
+        for first in range(0, size, CHAINS_TOGETHER):
+            count = 0
+            for i in range(first, min(first + CHAINS_TOGETHER, size)):
+                if joint_speed(chain, alphadot[i]) > 0.0:
+                    moving[count] = i
+                    count += 1
+                else:
+                    xi[i, 0] = 0.0
+                    xi[i, 1] = 0.0
+                    xi[i, 2] = 0.0
+                    residual[i] = 0.0
+                    code[i] = STUCK
+                    evaluations[i] = 0
+            n_moving += count
+            elements = (
+                np.empty((n, count)),
+                np.empty((n, count)),
+                np.empty((n, count)),
+                np.empty((n, count)),
+                half,
+                weight,
+                np.empty((n, count)),
+                np.empty((n, count)),
+                np.empty((n, count)),
+            )
+            frame = (
+                np.empty((1, count)),
+                np.empty((1, count)),
+                np.empty((1, count)),
+                np.empty((1, count)),
+                np.empty((1, count)),
+            )
+            for j in range(count):
+                shape = alpha[moving[j]]
+                rate = alphadot[moving[j]]
+                pose_links(chain, shape, rate, rows)
+                write_links(chain, rows, elements, frame, j)
+                speed = joint_speed(chain, rate)
+                above_1 = max(speed - 1.0, 0.0)
+                frame[FORCE_SCALE][0, j] = (
+                    chain.force
+                    + chain.force_by_speed * speed
+                    + chain.force_above_1 * above_1
+                )
+                frame[SPEED_SCALE][0, j] = speed
+                frame[LAW_SPEED][0, j] = speed if chain.law_at_speed else 1.0
+            out = np.empty((RESULT_ROWS, count))
+            sides = elements, none, none, none
+            loads = numbers, sides, points, terms, frame, additions
+            solve(loads, none, guess, descent, limits, out)
+            for j in range(count):
+                i = moving[j]
+                speed = frame[SPEED_SCALE][0, j]
+                xi[i, 0] = out[0, j] * speed * chain.length
+                xi[i, 1] = out[1, j] * speed * chain.length
+                xi[i, 2] = out[2, j] * speed
+                residual[i] = out[RESIDUAL, j]
+                evaluations[i] = out[EVALUATIONS, j]
+                code[i] = SLIDING
+                if out[SLOWEST, j] < chain.stuck_below:
+                    code[i] = STUCK
+                if not out[RESIDUAL, j] <= limits.residual:
+                    code[i] = UNCONVERGED
+                    unsolved += 1
+        return n_moving, unsolved
+
+    return cached(
+        velocities, f"velocities of chains for laws of the form {Law.__name__}"
+    )

@@ -19,13 +19,13 @@ curve, where the tangent dF/dxi has a positive determinant.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
 
-from rft.balance.arrays import row, velocities
+from rft.balance.arrays import nets, row, velocities
 from rft.effects.contact import Problem
 from rft.formulas.newton import (
     VISCOUS,
@@ -39,6 +39,7 @@ from rft.formulas.newton import (
 
 # rounding to start from, over the scale of speed: no element is that fast
 WIDEST = 10.0
+LOST = 2.0  # rounding over the first one, beyond which a walk has taken the way back
 FIRST_STEP = 2.0
 LARGEST_CORRECTION = 1.0  # first correction of a step that is not refused
 # Size of a correction that is the last of a step: over that of the previous correction,
@@ -91,15 +92,14 @@ def _wrench(problem: Problem, force: np.ndarray) -> np.ndarray:
 
 
 def _with_slope(
-    nets: Callable, problem: Problem, xi, v, rounding
+    problem: Problem, xi, v, rounding
 ) -> tuple[np.ndarray, np.ndarray, int]:
     """Return force and moment on the frame followed by their slopes in xi, (3, 4, B),
     their slope (3, B) in the logarithm of the rounding, and the number of
     evaluations."""
     *net, by_speed = nets(problem, v, rounding, xi)
     net = np.array(net).transpose(1, 0, 2)
-    if problem.law_speed_scale.shape[-1] == 1:
-        # Drag stays if velocities and rounding double.
+    if problem.is_scale_free:
         return net, -by_speed, 1
     wider = nets(problem, v, (1.0 + DIFFERENCE) * rounding, xi)[0]
     return net, (wider - net[:, 0]) / DIFFERENCE, 2
@@ -188,25 +188,25 @@ class _Walk:
 
 
 def follow(
-    problem: Problem, limits: Limits, nets: Callable, correction: float, budget: int
+    problem: Problem, limits: Limits, correction: float, budget: int
 ) -> Iterator[tuple]:
     """Solve all samples of a problem. Yields their indices and their results, rows
     (6, b) as those of `rft.formulas.newton.result`, as they end, with an infinite
-    residual where the budget is spent.
+    residual where the budget is spent or the curve is lost.
 
-    nets: `rft.balance.arrays.nets` or that of `rft.balance.compiled`. correction:
-    intended size of the first correction of a step, by which the length of steps is
-    chosen. budget: most evaluations."""
-    walk = _start(nets, problem, limits.rounding)
+    correction: intended size of the first correction of a step, by which the length of
+    steps is chosen. budget: most evaluations."""
+    walk = _start(problem, limits.rounding)
     while walk.index.size:
         new = walk.point.shifted(walk.problem, walk.change)
         new = new._replace(rounding=np.where(walk.last, limits.rounding, new.rounding))
-        net, slope, evaluations = _with_slope(nets, walk.problem, *new)
+        net, slope, evaluations = _with_slope(walk.problem, *new)
         walk.evaluations = walk.evaluations + evaluations
         residual = residual_norm(net[:, 0], row(walk.problem.frame))
         solved = walk.last & (residual <= limits.residual)
         _correct(walk, new, net, slope, correction, limits.rounding)
-        ended = solved | (walk.evaluations >= budget)
+        is_lost = walk.base.rounding > LOST * max(WIDEST, limits.rounding)
+        ended = solved | (walk.evaluations >= budget) | is_lost
         if ended.any():
             i = np.flatnonzero(ended)
             residual = np.where(solved & is_possible(*new.xi), residual, np.inf)
@@ -218,7 +218,7 @@ def follow(
             walk = walk.take(np.flatnonzero(~ended))
 
 
-def _start(nets: Callable, problem: Problem, last: float) -> _Walk:
+def _start(problem: Problem, last: float) -> _Walk:
     """Return all samples at the viscous solution, with a first step towards less
     rounding."""
     size = problem.n_samples

@@ -40,7 +40,7 @@ WARM = Descent(0.0, 0.0, 0.0, np.inf, 12.0)  # from a guess, on the last level a
 # Walks along a curve: intended size of a step's first correction, most evaluations. A
 # force law alone needs no more than these; the slow descents are for effects and
 # quadrature rules whose kinks are not rounded off.
-WALKS = ((0.2, 150), (0.02, 600))
+WALKS = ((0.2, 150), (0.02, 600), (0.005, 2000), (0.001, 5000))
 SLOW = (
     Descent(0.1, 0.1, 1e-4, 1e3, 150.0),
     Descent(0.3, 0.3, 1e-6, np.inf, 500.0),
@@ -88,15 +88,36 @@ def solve(
     report = listener()
     linear = assembly.linear
     batch = max(1, ELEMENTS_TOGETHER // assembly.n_law_points)
-    driver = arrays
+    descend_all, walk_all = arrays.solve, follow
     worth = 2 * batch  # samples that pay for a thread
     if solves_compiled(backend, assembly.law):
-        driver = compiled_driver()
+        compiled = compiled_driver()
+        descend_all, walk_all = compiled.solve, compiled.follow
         worth = COMPILED_WORTH
         batch = 4 * batch
-    results = np.zeros((RESULT_ROWS, size))
-    limit = np.zeros(size)
-    results[RESIDUAL] = np.inf
+    methods: list = [QUICK, *WALKS, *SLOW]
+    if guess is not None:
+        methods.insert(0, WARM)
+        with np.errstate(over="ignore"):
+            guess = guess / scale
+    unsolved = np.arange(size)
+    starts = guess is None or is_possible(*guess).all()
+    if starts and 0 < size <= min(batch, worth):
+        # Few samples, which most often take one descent: nothing is shared out.
+        problem = problem_at(unsolved)
+        limits = _limits(problem, accuracy)
+        descent = begin(methods.pop(0), linear, limits)
+        results = descend_all(problem, descent, limits, guess)
+        report(size, assembly.n_law_points, linear)
+        solved = results[RESIDUAL] <= limits.residual
+        if solved.all():
+            return _solutions(results, scale, limits.residual, accuracy, linear)
+        limit = np.full(size, limits.residual)
+        unsolved = np.flatnonzero(~solved)
+    else:
+        results = np.zeros((RESULT_ROWS, size))
+        results[RESIDUAL] = np.inf
+        limit = np.zeros(size)
 
     def store(index, new, limits: Limits) -> None:
         new[EVALUATIONS] += results[EVALUATIONS, index]
@@ -115,8 +136,8 @@ def solve(
             if method is WARM:
                 first = guess[:, index]
             n_new = problem.n_samples - np.count_nonzero(results[EVALUATIONS, index])
-            descent = _begin(method, linear, limits)
-            store(index, driver.solve(problem, descent, limits, first), limits)
+            descent = begin(method, linear, limits)
+            store(index, descend_all(problem, descent, limits, first), limits)
             if n_new:
                 report(n_new, assembly.n_law_points, linear)
 
@@ -124,17 +145,11 @@ def solve(
         for index in split(share, math.ceil(share.size / batch)):
             problem = problem_at(index)
             limits = _limits(problem, accuracy)
-            for i, ended in follow(problem, limits, driver.nets, *method):
+            for i, ended in walk_all(problem, limits, *method):
                 solved = ended[RESIDUAL] <= limits.residual
                 store(index[i[solved]], ended[:, solved], limits)
                 results[EVALUATIONS, index[i[~solved]]] += ended[EVALUATIONS, ~solved]
 
-    unsolved = np.arange(size)
-    methods: list = [QUICK, *WALKS, *SLOW]
-    if guess is not None:
-        methods.insert(0, WARM)
-        with np.errstate(over="ignore"):
-            guess = guess / scale
     for method in methods:
         active = unsolved
         if method is WARM:
@@ -148,14 +163,22 @@ def solve(
         if solved.all():
             break
         unsolved = np.flatnonzero(~solved)
+    limit = float(limit.max(initial=0.0))
+    return _solutions(results, scale, limit, accuracy, linear)
+
+
+def _solutions(
+    results: np.ndarray,
+    scale: np.ndarray,
+    limit: float,
+    accuracy: Accuracy,
+    linear: bool,
+) -> Solutions:
+    """Return the solutions in the rows of results."""
     residual, evaluations, slowest = results[RESIDUAL:]
     stuck = (slowest < STUCK_BELOW * accuracy.rounding) & (not linear)
     return Solutions(
-        results[:3] * scale,
-        residual,
-        evaluations.astype(int),
-        stuck,
-        float(limit.max(initial=0.0)),
+        results[:3] * scale, residual, evaluations.astype(int), stuck, limit
     )
 
 
@@ -167,22 +190,29 @@ def compiled_driver() -> ModuleType:
     return compiled
 
 
-def _begin(descent: Descent, linear: bool, limits: Limits) -> Descent:
+def begin(descent: Descent, linear: bool, limits: Limits) -> Descent:
     """Return the descent with the rounding of its first level, which is also the last
     level in a linear medium."""
-    if linear:
-        return descent._replace(first=limits.rounding)
-    return descent._replace(first=max(descent.first, limits.rounding))
+    first = limits.rounding
+    if not linear:
+        first = max(descent.first, first)
+    return Descent(first, *descent[1:])
 
 
 def _limits(problem: Problem, accuracy: Accuracy) -> Limits:
     """Return the limits of a problem, whose residual allows for roundoff of the largest
     forces."""
-    largest = max(1.0, problem.lateral_drag / problem.axial_drag)
-    residual = accuracy.tolerance + 1e-14 * largest
+    rounding, residual, *_ = limits_of(problem, accuracy)
     if problem.momentum_rate is not None:
         frame = problem.frame
         m = problem.momentum_rate
         inertia = m.rate * m.strength * frame.speed_scale / frame.force_scale
         residual += 1e-14 * np.max(inertia)
+    return Limits(rounding, float(residual))
+
+
+def limits_of(drag: Problem | Assembly, accuracy: Accuracy) -> Limits:
+    """Return the limits of a massless body with the largest forces of its drag."""
+    largest = max(1.0, drag.lateral_drag / drag.axial_drag)
+    residual = accuracy.tolerance + 1e-14 * largest
     return Limits(float(accuracy.rounding), float(residual))

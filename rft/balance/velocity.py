@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rft.balance.backend import check
+from rft.balance.backend import check, solves_compiled
+from rft.balance.chains import ChainBalance, chain_numbers
 from rft.balance.solver import Accuracy, Solutions, solve
 from rft.bodies.base import Body, body_size, joint_speed
 from rft.bodies.pieces import PIECES
@@ -18,12 +19,13 @@ from rft.core.premise import negation
 from rft.core.refusal import Refusal, require
 from rft.effects.base import Effect, broken_premises, engine
 from rft.effects.contact import Assembly, Problem, assemble
-from rft.laws.base import Medium
+from rft.formulas.newton import UNCONVERGED
+from rft.laws.base import Medium, cached_if_immutable
 
 STATUSES = np.array(["sliding", "stuck", "unconverged"])
-UNCONVERGED = 2
 SAMPLES_TOGETHER = 2**20  # that are solved at once, for the memory they take
 LEAST_RATE = 1e-100  # other than 0
+FEW = 16  # numbers, which Python compares sooner than NumPy
 
 
 class Solution(NamedTuple):
@@ -146,50 +148,184 @@ def body_velocity(
     >>> solution.xi.round(4), str(solution.status)
     (array([ 0.015 ,  0.0161, -0.1929]), 'sliding')
     """
-    if effects != () and engine(effects) != "algebraic":
-        broken = negation(broken_premises(effects))
-        raise Refusal(
-            f"no body velocity follows from shape alone where effects are {broken}",
-            instead="use rft.time_steps",
-        )
-    assembly = assemble(medium, body, effects, loads, pieces)
-    alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, tolerance)
     check(backend)
-    if threads is not None:
-        in_range("threads", threads, 1, 1024, whole=True)
-    batch = alpha.shape[:-1]
-    length = body_size(body)
-    guess = None
-    if start is not None:
-        guess = _guess(start, batch, length)
-
-    alpha = alpha.reshape(-1, body.joints)
-    alphadot = alphadot.reshape(-1, body.joints)
-    size = len(alpha)
-    accuracy = Accuracy(regularisation, tolerance)
-    found = Solution(
-        np.empty((size, 3)),
-        np.empty(size),
-        np.empty(size, np.uint8),
-        np.empty(size, np.int32),
+    if effects != ():
+        engine(effects)  # refuses what is no list of effects
+    prepared = _prepared(
+        medium,
+        body,
+        loads,
+        regularisation,
+        tolerance,
+        threads,
+        tuple(effects),
+        pieces,
+        backend,
     )
-    for first in range(0, size, SAMPLES_TOGETHER):
-        part = slice(first, first + SAMPLES_TOGETHER)
-        part_assembly = assembly
-        if size > SAMPLES_TOGETHER:
-            part_assembly = assembly.take(part)
-        samples = _samples(part_assembly, body, alpha[part], alphadot[part])
-        if guess is not None:
-            samples = samples._replace(guess=guess[:, part])
-        solved = _solved(samples, accuracy, backend, threads)
-        found.xi[part] = solved.xi.T
-        found.residual[part] = solved.residual
+    return prepared(alpha, alphadot, start)
+
+
+class BodyVelocity:
+    """`body_velocity` of one body in one medium, for many calls: medium, body, effects
+    and options are checked, and assembled, once.
+
+    Parameters
+    ----------
+    medium, body, loads, regularisation, tolerance, threads, effects, pieces, backend :
+        as in `body_velocity`.
+
+    A call takes ``alpha`` and ``alphadot``, arrays (..., joints) that broadcast, shapes
+    in rad and their rates in rad/time, and ``start`` where velocities are known; it
+    returns a `Solution`, the same to the last digit as that of `body_velocity`.
+
+    Raises
+    ------
+    ValueError
+        As `body_velocity`, for shapes and rates at the call.
+
+    Examples
+    --------
+    >>> from rft import BodyVelocity, Chain, Granular
+    >>> velocity = BodyVelocity(Granular(1.8, 0.24), Chain())
+    >>> velocity([0.5, 0.3], [1.0, 0.0]).xi.round(4)
+    array([ 0.015 ,  0.0161, -0.1929])
+    >>> velocity([[0.5, 0.3], [0.2, 0.1]], [1.0, 0.0]).xi.shape
+    (2, 3)
+    """
+
+    def __init__(
+        self,
+        medium: Medium,
+        body: Body,
+        *,
+        loads: str = "exact",
+        regularisation: float = 1e-6,
+        tolerance: float = 1e-10,
+        threads: int | None = None,
+        effects: Sequence[Effect] = (),
+        pieces: int = PIECES,
+        backend: str = "auto",
+    ):
+        if effects != () and engine(effects) != "algebraic":
+            broken = negation(broken_premises(effects))
+            raise Refusal(
+                f"no body velocity follows from shape alone where effects are {broken}",
+                instead="use rft.time_steps",
+            )
+        self._assembly = assemble(medium, body, effects, loads, pieces)
+        check_accuracy(regularisation, tolerance)
+        check(backend)
+        if threads is not None:
+            in_range("threads", threads, 1, 1024, whole=True)
+        self._body = body
+        self._length = body_size(body)
+        self._accuracy = Accuracy(regularisation, tolerance)
+        self._threads = threads
+        self._backend = backend
+        numbers = chain_numbers(self._assembly, self._accuracy)
+        self._chain = None
+        if numbers is not None:
+            self._chain = ChainBalance(self._assembly, numbers, self._accuracy)
+
+    def __call__(
+        self, alpha: ArrayLike, alphadot: ArrayLike, start: ArrayLike | None = None
+    ) -> Solution:
+        """Return the body velocity at shapes and rates."""
+        alpha, alphadot = checked_motion(self._body, alpha, alphadot)
+        batch = alpha.shape[:-1]
+        guess = None
+        if start is not None:
+            guess = _guess(start, batch, self._length)
+        alpha = alpha.reshape(-1, self._body.joints)
+        alphadot = alphadot.reshape(-1, self._body.joints)
+        size = len(alpha)
+        compiled = solves_compiled(self._backend, self._assembly.law)
+        if self._chain is not None and compiled and guess is None and size:
+            found = self._of_chain(alpha, alphadot)
+        elif size <= SAMPLES_TOGETHER:
+            found = self._solution(self._assembly, alpha, alphadot, guess)
+        else:
+            found = Solution(
+                np.empty((size, 3)),
+                np.empty(size),
+                np.empty(size, np.uint8),
+                np.empty(size, np.int32),
+            )
+            for first in range(0, size, SAMPLES_TOGETHER):
+                part = slice(first, first + SAMPLES_TOGETHER)
+                part_guess = None
+                if guess is not None:
+                    part_guess = guess[:, part]
+                solution = self._solution(
+                    self._assembly.take(part), alpha[part], alphadot[part], part_guess
+                )
+                for whole, values in zip(found, solution):
+                    whole[part] = values
+        return Solution(
+            found.xi.reshape(*batch, 3), *[x.reshape(batch) for x in found[1:]]
+        )
+
+    def _of_chain(self, alpha: np.ndarray, alphadot: np.ndarray) -> Solution:
+        """Return the solution at shapes and rates (B, joints) of a chain; what one
+        descent leaves unsolved is solved as of any body."""
+        fields, unsolved = self._chain.solve(alpha, alphadot, self._threads)
+        found = Solution(*fields)
+        if unsolved:
+            i = np.flatnonzero(found.code == UNCONVERGED)
+            rest = self._solution(self._assembly, alpha[i], alphadot[i], None)
+            for whole, values in zip(found, rest):
+                whole[i] = values
+        return found
+
+    def _solution(
+        self,
+        assembly: Assembly,
+        alpha: np.ndarray,
+        alphadot: np.ndarray,
+        guess: np.ndarray | None,
+    ) -> Solution:
+        """Return the solution at shapes and rates (B, joints) from guesses (3, B) in
+        body lengths."""
+        alpha = np.ascontiguousarray(alpha.T)
+        alphadot = np.ascontiguousarray(alphadot.T)
+        speed = joint_speed(self._body, alphadot)
+        samples = Samples(assembly, alpha, alphadot, speed, guess)
+        solved = _solved(samples, self._accuracy, self._backend, self._threads)
         within_limit = solved.residual <= solved.limit
-        found.code[part] = np.where(within_limit, solved.stuck, UNCONVERGED)
-        found.iterations[part] = solved.iterations
-    if length != 1.0:
-        found.xi[:, :2] *= length
-    return Solution(found.xi.reshape(*batch, 3), *(x.reshape(batch) for x in found[1:]))
+        xi = np.ascontiguousarray(solved.xi.T)
+        if self._length != 1.0:
+            xi[:, :2] *= self._length
+        return Solution(
+            xi,
+            solved.residual,
+            np.where(within_limit, solved.stuck, UNCONVERGED).astype(np.uint8),
+            solved.iterations.astype(np.int32),
+        )
+
+
+@cached_if_immutable
+def _prepared(
+    medium,
+    body,
+    loads,
+    regularisation,
+    tolerance,
+    threads,
+    effects,
+    pieces,
+    backend,
+) -> BodyVelocity:
+    return BodyVelocity(
+        medium,
+        body,
+        loads=loads,
+        regularisation=regularisation,
+        tolerance=tolerance,
+        threads=threads,
+        effects=effects,
+        pieces=pieces,
+        backend=backend,
+    )
 
 
 class Samples(NamedTuple):
@@ -224,15 +360,6 @@ class Samples(NamedTuple):
         return self.assembly.take(index).problem(
             self.alpha[:, index], self.alphadot[:, index], self.speed[index]
         )
-
-
-def _samples(
-    assembly: Assembly, body: Body, alpha: np.ndarray, alphadot: np.ndarray
-) -> Samples:
-    """Return samples of shapes and rates (B, joints), without guesses."""
-    alpha = np.ascontiguousarray(alpha.T)
-    alphadot = np.ascontiguousarray(alphadot.T)
-    return Samples(assembly, alpha, alphadot, joint_speed(body, alphadot), None)
 
 
 def _solved(
@@ -296,37 +423,63 @@ def _broadcasts(shape: tuple, to: tuple) -> bool:
         return False
 
 
-def checked_input(body, alpha, alphadot, regularisation, tolerance) -> list[np.ndarray]:
-    """Return shapes and rates as arrays of one shape (..., joints); ValueError for
-    arguments of another shape or out of bounds."""
+def check_accuracy(regularisation: float, tolerance: float) -> None:
+    """Raise ValueError unless regularisation and tolerance are within bounds."""
     in_range("regularisation", regularisation, 1e-15, 1e3)
     in_range("tolerance", tolerance, 1e-15, 1e3)
-    arrays = []
-    for name, x, largest in (("alpha", alpha, 1e6), ("alphadot", alphadot, 1e100)):
-        x = real_array(name, x)
-        if x.ndim == 0 or x.shape[-1] != body.joints:
-            raise Refusal(
-                f"{name} must have shape (..., {body.joints}) for this body",
-                value=x.shape,
-            )
-        size = np.abs(x)
-        has_digits = size.max(initial=0.0) <= largest
-        if not has_digits and not np.isfinite(x).all():
-            raise Refusal(f"{name} must be finite, got {float(x[~np.isfinite(x)][0])}")
-        # The second minimum takes longer, and is only needed where some rate is 0.
-        if name == "alphadot" and size.min(initial=1.0) < LEAST_RATE:
-            has_digits &= size.min(initial=1.0, where=size > 0) >= LEAST_RATE
-        if not has_digits:
-            raise Refusal(
-                f"{name} must be 0 or of a size that leaves digits to compute with, "
-                f"got {x.ravel()[:4]}"
-            )
-        arrays.append(x)
-    if arrays[0].shape == arrays[1].shape:
-        return arrays
+
+
+def checked_input(body, alpha, alphadot, regularisation, tolerance) -> list[np.ndarray]:
+    """Return `checked_motion` of shapes and rates; ValueError unless regularisation and
+    tolerance are within bounds, too."""
+    check_accuracy(regularisation, tolerance)
+    return checked_motion(body, alpha, alphadot)
+
+
+def checked_motion(body, alpha, alphadot) -> list[np.ndarray]:
+    """Return shapes and rates as arrays of one shape (..., joints); ValueError for
+    arguments of another shape or out of bounds."""
+    alpha = _checked("alpha", alpha, body.joints, 0.0, 1e6)
+    alphadot = _checked("alphadot", alphadot, body.joints, LEAST_RATE, 1e100)
+    if alpha.shape == alphadot.shape:
+        return [alpha, alphadot]
     try:
-        return np.broadcast_arrays(*arrays)
+        shape = np.broadcast_shapes(alpha.shape, alphadot.shape)
     except ValueError:
         raise Refusal(
-            f"alpha {arrays[0].shape} and alphadot {arrays[1].shape} do not broadcast"
+            f"alpha {alpha.shape} and alphadot {alphadot.shape} do not broadcast"
         ) from None
+    return [np.broadcast_to(alpha, shape), np.broadcast_to(alphadot, shape)]
+
+
+def _checked(
+    name: str, x: ArrayLike, joints: int, least: float, largest: float
+) -> np.ndarray:
+    """Return x as an array (..., joints) of floats; ValueError with its name unless its
+    numbers are 0, or of a size from ``least`` to ``largest``."""
+    x = real_array(name, x)
+    if x.ndim == 0 or x.shape[-1] != joints:
+        raise Refusal(
+            f"{name} must have shape (..., {joints}) for this body", value=x.shape
+        )
+    if _has_digits(x, least, largest):
+        return x
+    if not np.isfinite(x).all():
+        raise Refusal(f"{name} must be finite, got {float(x[~np.isfinite(x)][0])}")
+    raise Refusal(
+        f"{name} must be 0 or of a size that leaves digits to compute with, "
+        f"got {x.ravel()[:4]}"
+    )
+
+
+def _has_digits(x: np.ndarray, least: float, largest: float) -> bool:
+    """Return whether all numbers are 0, or of a size from ``least`` to ``largest``."""
+    if x.size <= FEW:
+        return all(v == 0.0 or least <= abs(v) <= largest for v in x.ravel().tolist())
+    size = np.abs(x)
+    if not size.max() <= largest:
+        return False
+    # The second minimum takes longer, and is only needed where some number is 0.
+    return bool(
+        size.min() >= least or size.min(initial=np.inf, where=size > 0) >= least
+    )

@@ -231,7 +231,7 @@ def joint_speed(body: Body, alphadot: np.ndarray) -> np.ndarray:
     """Return the size (B,) of the joint rates at rates (joints, B) of the shape
     variables, by which velocities are scaled."""
     rates = _joint_angles(body, alphadot)
-    return np.sqrt((rates * rates).sum(0))
+    return np.sqrt(np.add.reduce(rates * rates))
 
 
 def half_lengths(body: Body) -> np.ndarray:

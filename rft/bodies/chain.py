@@ -9,10 +9,12 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.bodies.base import BODIES, Length, numbered_labels
+from rft.bodies.base import BODIES, Elements, Length, numbered_labels
 from rft.bodies.links import Links
 from rft.bodies.modes import checked_modes, mode_rows
 from rft.core.checks import Number, check_numbers
+
+SHORT = 16  # links up to which sums over them are products with a matrix
 
 
 @BODIES.register
@@ -67,10 +69,11 @@ class Chain(Links):
         """Number of shape variables: joints between links, or modes."""
         if self.modes is None:
             return len(self.lengths) - 1
-        return len(self._mode_rows)
+        return len(self.mode_rows)
 
     @cached_property
-    def _mode_rows(self) -> np.ndarray:
+    def mode_rows(self) -> np.ndarray:
+        """The modes, (joints, n - 1): rows of joint angles."""
         return mode_rows(self.modes, self.waves, len(self.lengths))
 
     def joint_angles(self, shape: np.ndarray) -> np.ndarray:
@@ -78,7 +81,7 @@ class Chain(Links):
         of rates."""
         if self.modes is None:
             return shape
-        return self._mode_rows.T @ shape
+        return self.mode_rows.T @ shape
 
     @property
     def shape_labels(self) -> tuple[tuple[str, str], ...]:
@@ -86,31 +89,76 @@ class Chain(Links):
         name = "alpha_{}" if self.modes is None else "m_{}"
         return numbered_labels(self.joints, name)
 
-    def _in_frame(self, differences: np.ndarray, link: int | None) -> np.ndarray:
-        """Return values of all links (n, B), less the frame's, from the differences
-        (n - 1, B) between neighbours."""
-        x = np.zeros((len(self.lengths), differences.shape[1]), differences.dtype)
-        np.add.accumulate(differences, 0, out=x[1:])
-        x -= self._frame_value(x, link)
-        return x
+    def _in_frame(self, differences: np.ndarray) -> np.ndarray:
+        """Return values of all links (k, n, B), less the frame's, from the differences
+        (k, n - 1, B) between neighbours."""
+        if len(self.lengths) <= SHORT:
+            return self._sums @ differences
+        return self._summed(differences)
+
+    def _summed(self, differences: np.ndarray) -> np.ndarray:
+        """Return the same by sums from the tail on."""
+        k, _, size = differences.shape
+        x = np.zeros((k, len(self.lengths), size))
+        np.add.accumulate(differences, 1, out=x[:, 1:])
+        if self.frame_link is None:
+            return x - (self.fractions @ x)[:, None]
+        return x - x[:, self.frame_link, None]
+
+    @cached_property
+    def _sums(self) -> np.ndarray:
+        """The matrix (n, n - 1) of these sums."""
+        return self._summed(np.eye(len(self.lengths) - 1)[None])[0]
+
+    def _lines(
+        self, alpha: np.ndarray, alphadot: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return three arrays of the links in the body frame at shapes and rates
+        (joints, B): headings and their rates (2, n, B); unit vectors along the links
+        and the rates of these, (c, s, dc/dt, ds/dt), (4, n, B); centres and their
+        velocities, (x, y, dx/dt, dy/dt), (4, n, B)."""
+        n = len(self.lengths)
+        joints = np.empty((2, n - 1, alpha.shape[1]))
+        joints[0] = self.joint_angles(alpha)
+        joints[1] = self.joint_angles(alphadot)
+        headings = self._in_frame(joints)
+        theta, rotation = headings
+        units = np.empty((4, *theta.shape))
+        c, s, c_rate, s_rate = units
+        np.cos(theta, out=c)
+        np.sin(theta, out=s)
+        np.multiply(rotation, -s, out=c_rate)
+        np.multiply(rotation, c, out=s_rate)
+        halves = self._half_lengths * units
+        return headings, units, self._in_frame(halves[:, :-1] + halves[:, 1:])
 
     def _links(self, alpha, alphadot):
-        size = alpha.shape[1]
-        link = self._link
-        # Angles and their rates are summed as one array.
-        joints = [self.joint_angles(alpha), self.joint_angles(alphadot)]
-        angles = self._in_frame(np.concatenate(joints, 1), link)
-        theta = angles[:, :size]
-        rotation = angles[:, size:]
-        heading = np.empty(theta.shape, complex)
-        np.cos(theta, out=heading.real)
-        np.sin(theta, out=heading.imag)
-        # Half links as vectors, and their velocities.
-        halves = np.empty((len(theta), 2 * size), complex)
-        np.multiply(self._half_lengths, heading, out=halves[:, :size])
-        np.multiply(1j * rotation, halves[:, :size], out=halves[:, size:])
-        centres = self._in_frame(halves[:-1] + halves[1:], link)
-        return heading, rotation, centres[:, :size], centres[:, size:], theta
+        (theta, rotation), (c, s, *_), (x, y, v_x, v_y) = self._lines(alpha, alphadot)
+        return c + 1j * s, rotation, x + 1j * y, v_x + 1j * v_y, theta
+
+    def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Elements:
+        (_, rotation), (c, s, *_), centres = self._lines(alpha, alphadot)
+        # Each of (x, dx/dt) and (y, dy/dt), in turn along and across the links.
+        x = centres[::2]
+        y = centres[1::2]
+        along = x * c + y * s
+        across = y * c - x * s
+        half = self._half_lengths
+        return Elements(
+            c,
+            s,
+            -across[0],
+            along[0],
+            half,
+            self._weights,
+            along[1],
+            across[1],
+            rotation * half,
+        )
+
+    @cached_property
+    def _weights(self) -> np.ndarray:
+        return 2.0 * self._half_lengths
 
     @classmethod
     def examples(cls) -> dict[str, Chain]:

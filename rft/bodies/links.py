@@ -93,7 +93,8 @@ class Links:
         return number - 1
 
     @cached_property
-    def _link(self) -> int | None:
+    def frame_link(self) -> int | None:
+        """Index of the link that carries the frame, None for "mean"."""
         return self._frame_link(self.frame)
 
     def _frame_value(self, x: np.ndarray, link: int | None) -> np.ndarray:

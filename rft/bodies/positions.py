@@ -136,7 +136,7 @@ class PosedLinks(Links):
         """Return what `_links` does from centres, headings and their rates (n, B) in
         any one frame."""
         origin, frame_velocity, frame_theta, frame_rotation = (
-            self._frame_value(x, self._link)
+            self._frame_value(x, self.frame_link)
             for x in (centre, velocity, theta, rotation)
         )
         to_frame = np.exp(-1j * frame_theta)

@@ -114,10 +114,13 @@ class Problem(NamedTuple):
     def law_speed_scale(self) -> np.ndarray:
         """Scale (1, B or 1) of the velocities that loads are computed at; 1 where drag
         does not depend on the speed."""
+        return ONE if self.is_scale_free else self.frame.speed_scale
+
+    @property
+    def is_scale_free(self) -> bool:
+        """Whether drag stays if all velocities, and the rounding, double."""
         a = self.additions
-        if self.homogeneous and not (a.quadratic or a.memory or a.momentum):
-            return ONE
-        return self.frame.speed_scale
+        return self.homogeneous and not (a.quadratic or a.memory or a.momentum)
 
     def take(self, index) -> Problem:
         """Return the problem of the samples ``index``."""

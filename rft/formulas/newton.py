@@ -31,6 +31,7 @@ RESIDUAL = 3
 EVALUATIONS = 4
 SLOWEST = 5
 RESULT_ROWS = 6
+SLIDING, STUCK, UNCONVERGED = range(3)  # status of a sample
 
 
 class Frame(NamedTuple):

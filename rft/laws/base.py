@@ -208,7 +208,7 @@ def cached_if_immutable(function: Callable) -> Callable:
     """Return the function with a cache of its last 32 calls; calls with an argument
     that may change are not cached.
 
-    Immutable are frozen dataclasses (`is_frozen`), text, integers, and tuples of
+    Immutable are frozen dataclasses (`is_frozen`), text, numbers, None, and tuples of
     these."""
     cached = functools.lru_cache(maxsize=32)(function)
 
@@ -224,7 +224,7 @@ def cached_if_immutable(function: Callable) -> Callable:
 def _is_immutable(x) -> bool:
     if type(x) is tuple:
         return all(map(_is_immutable, x))
-    return type(x) in (str, int) or is_frozen(x)
+    return type(x) in (str, int, float, type(None)) or is_frozen(x)
 
 
 # Velocities at which properties of a law are checked: 48 directions at 13 speeds,

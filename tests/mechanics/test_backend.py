@@ -27,6 +27,7 @@ from geomech import scenes
 from geomech.mathematics.gaits import Ellipse
 from rft import (
     Backbone,
+    BodyVelocity,
     Chain,
     DisturbedGround,
     EndCaps,
@@ -36,7 +37,7 @@ from rft import (
     body_velocity,
     time_steps,
 )
-from rft.balance import ahead, backend
+from rft.balance import ahead, backend, path
 from rft.balance import solver as balance
 from rft.balance.backend import Note
 from rft.bodies import Elements
@@ -44,6 +45,7 @@ from rft.core.premise import Premise
 from rft.core.refusal import Refusal
 from rft.effects import Effect
 from rft.effects.contact import assemble
+from rft.formulas.momentum import MomentumRate
 from rft.formulas.newton import Limits
 from rft.formulas.vectors import formula, sqrt
 from rft.laws.base import TermLaw
@@ -170,6 +172,59 @@ def test_a_sample_alone_has_the_digits_that_it_has_among_others(body, effects):
     common = balance.QUICK, Limits(1e-6, 1e-10), None
     alone = [solve(problem.take(np.array([i])), *common) for i in range(40)]
     np.testing.assert_array_equal(np.concatenate(alone, 1), solve(problem, *common))
+
+
+@compiled
+@pytest.mark.parametrize("medium", [GLASS, Both()], ids=["dry", "both"])
+def test_one_prepared_chain_has_the_digits_of_body_velocity(medium):
+    """And those that it has among others, at rest and on both sides of a block."""
+    body = Chain((0.8, 1.3, 1.0, 0.7), 0.3, modes=((1.4, 0.3, -0.5), (-0.2, 0.9, 2.1)))
+    velocity = BodyVelocity(medium, body, backend="numba")
+    rng = np.random.default_rng(12)
+    alpha, alphadot = rng.uniform(-1, 1, (2, 1100, 2))
+    alphadot[3] = 0.0
+    among = velocity(alpha, alphadot)
+    asked = medium, body, alpha, alphadot
+    for a, b in zip(among, body_velocity(*asked, backend="numba")):
+        np.testing.assert_array_equal(a, b)
+    for i in (0, 3, 1023, 1024, 1099):
+        alone = velocity(alpha[i], alphadot[i])
+        for a, b in zip(alone, among):
+            np.testing.assert_array_equal(a, b[i])
+    plain = body_velocity(*asked, backend="numpy")
+    assert (plain.code == among.code).all()
+    assert apart(among, plain, np.maximum(abs(alphadot), 0.01), body).max() < 1e-11
+
+
+@compiled
+@pytest.mark.parametrize("mass", [0.0, 0.3])
+@pytest.mark.parametrize(
+    ("medium", "effects"),
+    [
+        (GLASS, ()),
+        (Both(), (SkinFriction(),)),
+        (GLASS, (EndCaps(radius=0.06, tail=1.0), TowedSled(1.0, 0.3))),
+    ],
+    ids=["dry", "both", "points"],
+)
+def test_both_walk_along_the_same_curves(medium, effects, mass):
+    from rft.balance import compiled as fast
+
+    assembly = assemble(medium, BODY, sized(effects))
+    alpha, alphadot = np.random.default_rng(9).uniform(-2.5, 2.5, (2, 2, 20))
+    problem = assembly.problem(alpha, alphadot)
+    if mass:
+        past = np.full((3, 20), 0.01)
+        rate = MomentumRate(np.ones((1, 1)), past, past, past, np.full((1, 1), mass))
+        problem = problem._replace(momentum_rate=rate)
+    asked = problem, Limits(1e-6, 1e-10), 0.2, 400
+    wanted = np.empty((6, 20))
+    for i, rows in path.follow(*asked):
+        wanted[:, i] = rows
+    ((i, found),) = fast.follow(*asked)
+    assert np.isfinite(wanted[3]).all() and np.isfinite(found[3]).all()
+    np.testing.assert_allclose(found[:3, i], wanted[:3], rtol=0, atol=1e-9)
+    assert np.mean(found[4] == wanted[4]) > 0.9
 
 
 class Sheared:
@@ -460,14 +515,17 @@ def test_kernels_built_ahead_serve_closed_laws_without_numba(monkeypatch):
 @compiled
 def test_code_is_compiled_beforehand(capsys):
     from rft.balance.compiled import kernels_of
-    from rft.balance.kernels import kernel
+    from rft.balance.kernels import chain_kernel, kernel
 
     runpy.run_module("rft", run_name="__main__")
     assert capsys.readouterr().out.startswith("compiled code is kept in ")
-    kernel.cache_clear()
-    kernels_of.cache_clear()
+    for function in (kernel, chain_kernel, kernels_of):
+        function.cache_clear()
     body_velocity(GLASS, BODY, (0.4, -0.7), (1.0, 0.3), backend="numba")
-    assert sum(kernel(type(record(GLASS))).stats.cache_misses.values()) == 0
+    asked = {"start": np.zeros(3), "backend": "numba"}
+    body_velocity(GLASS, BODY, (0.4, -0.7), (1.0, 0.3), **asked)
+    for function in (kernel, chain_kernel):
+        assert sum(function(type(record(GLASS))).stats.cache_misses.values()) == 0
 
 
 @dataclasses.dataclass(frozen=True)

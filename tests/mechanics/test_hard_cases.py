@@ -308,6 +308,24 @@ def test_folds(name):
     )  # the same branch: at a fold they part by much more
 
 
+WAY_BACK = (
+    Granular(9.802017159410523, 0.6491130281674442),
+    Chain((1.354941115666729, 0.930051062795154, 0.2800145133387486, 1.59170403904621)),
+)
+
+
+def test_walks_that_take_the_way_back_are_begun_anew(solved_by):
+    """A quarter of the walks here turn at a fold, to wide rounding again, whatever
+    their steps, and one in twenty by both of the lengths that come first; there is one
+    solution."""
+    alpha = np.array([2.0689235254797094, -0.6492379591456583, 2.888801367122009])
+    rates = np.array([1.0024224503820196, 0.5617545614948484, 0.13544073178888066])
+    (wanted,) = solutions(*WAY_BACK, alpha, rates, 1e-6, 500)
+    alpha = alpha + np.random.default_rng(4).uniform(-1e-6, 1e-6, (300, 3))
+    found = body_velocity(*WAY_BACK, alpha, rates, backend=solved_by).checked()
+    np.testing.assert_allclose(found.xi - np.linalg.norm(rates) * wanted, 0, atol=1e-5)
+
+
 @pytest.mark.parametrize("name", FOLDS)
 def test_neighbours_of_folds(name):
     """As many as share a batch: the way out is not for a few samples only."""
@@ -377,6 +395,23 @@ def test_between_folds_there_are_three_solutions(regularisation, count):
     assert len(found) == count
     first = found[found[:, 0].argmin()]
     np.testing.assert_allclose(first, taken / np.linalg.norm(shapes[1]), atol=1e-7)
+
+
+def test_of_three_solutions_at_the_usual_rounding_the_first_is_taken(solved_by):
+    """Which follows from the viscous one without a jump as the rounding falls."""
+    alpha = 2.0688404, -0.6491862, 2.8888857
+    rates = 1.0025004, 0.561798, 0.1355264
+    problem = *WAY_BACK, alpha, rates
+    found = solutions(*problem, 1e-6, 300)
+    assert len(found) == 3
+    start = np.zeros(3)
+    for rounding in np.geomspace(10.0, 1e-6, 250):
+        asked = {"start": start, "regularisation": rounding, "backend": solved_by}
+        start = body_velocity(*problem, **asked).xi
+    taken = body_velocity(*problem, backend=solved_by).xi
+    np.testing.assert_allclose(taken, start, rtol=0, atol=1e-8)
+    first = found[np.abs(found[:, 2]).argmin()]
+    np.testing.assert_allclose(taken / np.linalg.norm(rates), first, atol=1e-7)
 
 
 def random_problem(rng, count):

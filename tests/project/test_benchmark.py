@@ -21,8 +21,18 @@ from geomech.mathematics.systems import Solver, Swimmer
 from geomech.mathematics.tiers.direct import direct
 from geomech.scenes import load
 from geomech.studies.scene_tables import SceneTables
-from rft import CATALOGUE, Backbone, Chain, Transient, body_velocity, time_steps
+from rft import (
+    CATALOGUE,
+    Backbone,
+    BodyVelocity,
+    Chain,
+    Granular,
+    Transient,
+    body_velocity,
+    time_steps,
+)
 from rft.balance.backend import preferring
+from rft.balance.solver import QUICK
 
 pytestmark = [
     pytest.mark.benchmark,
@@ -50,6 +60,18 @@ def in_turn(asked: dict, rounds: int = 5) -> dict[str, float]:
         for name, f in asked.items():
             times[name].append(shortest_time(f, 1))
     return {name: float(np.median(t[1:])) for name, t in times.items()}
+
+
+def least_in_turn(asked: dict, rounds: int = 40) -> dict[str, float]:
+    """Least CPU seconds of functions that take turns, for what takes no longer than the
+    pauses of a shared machine."""
+    times = {name: [] for name in asked}
+    for _ in range(rounds):
+        for name, f in asked.items():
+            start = time.process_time()
+            f()
+            times[name].append(time.process_time() - start)
+    return {name: min(t) for name, t in times.items()}
 
 
 def one_by_one(alpha, alphadot):
@@ -121,6 +143,47 @@ def test_against_a_loop_of_fsolve():
     print(f"  the loop says that it fails in {failed:.0%}", end=", ")
     print(f"is off by more than 0.01 in {np.mean(off > 0.01):.0%}")
     assert (solution.status != "unconverged").all()
+
+
+@pytest.mark.skipif("numba" not in backends(), reason="numba is missing")
+def test_one_velocity_against_a_plain_loop():
+    """By `body_velocity`, by a call that is prepared, and by the plain loop for one
+    sample, which checks and assembles nothing."""
+    asked_of = GLASS, MIDDLE
+    how = {"backend": "numba"}
+    one = [0.5, 0.3], [1.0, 0.0]
+    arrays = [np.array([x]) for x in one]
+    asked = {
+        "plain compiled loop": functools.partial(peers.plain_loop(), *arrays),
+        "body_velocity": functools.partial(body_velocity, *asked_of, *one, **how),
+        "prepared": functools.partial(BodyVelocity(*asked_of, **how), *one),
+    }
+    calls = {k: functools.partial(repeated, f, ()) for k, f in asked.items()}
+    took = least_in_turn(calls)
+    for name, seconds in took.items():
+        ratio = seconds / took["plain compiled loop"]
+        print(f"\n{name:20} {1e6 * seconds / CALLS:7.1f} us, ratio {ratio:.1f}", end="")
+    assert took["prepared"] < 4 * took["plain compiled loop"]
+    assert took["body_velocity"] < 6 * took["plain compiled loop"]
+
+
+@pytest.mark.skipif("numba" not in backends(), reason="numba is missing")
+def test_hard_samples_take_little_of_a_batch():
+    """Batches of a law far from monotone, whose curves of solutions fold, over the same
+    without the samples that are followed along their curves."""
+    law = Granular(8.0, np.radians(35.0))
+    rng = np.random.default_rng(5)
+    alpha = rng.uniform(-3, 3, (20_000, 2))
+    alphadot = rng.normal(size=(20_000, 2))
+    velocity = BodyVelocity(law, Chain(), backend="numba", threads=1)
+    walked = velocity(alpha, alphadot).checked().iterations > QUICK.budget
+    took = least_in_turn({
+        "all": functools.partial(velocity, alpha, alphadot),
+        "without": functools.partial(velocity, alpha[~walked], alphadot[~walked]),
+    })  # fmt: skip
+    ratio = took["all"] / took["without"]
+    print(f"\n{walked.sum()} of 20,000 are walked: ratio {ratio:.2f}")
+    assert walked.sum() > 0 and ratio < 1.5
 
 
 @pytest.mark.parametrize("gait", [Circle(), Butterfly()])

@@ -60,7 +60,7 @@ def test_every_command_has_its_answers_its_help_and_refusals():
 def failing(monkeypatch, how):
     """Let a batch of body velocities raise, the first; of an interrupted `run` the
     second, when there is something in its folder."""
-    solve = rft.body_velocity
+    solve = rft.BodyVelocity.__call__
     calls = []
     effort._is_even.cache_clear()  # it asks for velocities, too
 
@@ -70,20 +70,20 @@ def failing(monkeypatch, how):
             how()
         return solve(*args, **kwargs)
 
-    monkeypatch.setattr(rft, "body_velocity", fails)
+    monkeypatch.setattr(rft.BodyVelocity, "__call__", fails)
     return calls
 
 
 @pytest.mark.parametrize("name", SOLVING)
 def test_what_does_not_converge_ends_with_2(name, ended, monkeypatch):
-    solve = rft.body_velocity
+    solve = rft.BodyVelocity.__call__
     effort._is_even.cache_clear()
 
     def unconverged(*args, **kwargs):
         found = solve(*args, **kwargs)
         return found._replace(code=np.full(found.code.shape, UNCONVERGED))
 
-    monkeypatch.setattr(rft, "body_velocity", unconverged)
+    monkeypatch.setattr(rft.BodyVelocity, "__call__", unconverged)
     code, out, err, files = ended(name)
     assert (code, out, files) == (2, "", set())
     # On a slow machine the cost is told, too.

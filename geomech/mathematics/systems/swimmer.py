@@ -261,6 +261,12 @@ class Swimmer:
 
         Iterations begin from ``start`` (..., 3) where given. Refusal if velocities do
         not follow from shape alone."""
+        return self._body_velocity(alpha, alphadot, start)
+
+    @cached_property
+    def _body_velocity(self) -> rft.BodyVelocity:
+        """The balance of forces, assembled once; Refusal if velocities do not follow
+        from shape alone."""
         refuse(
             self,
             "body velocity from shape alone",
@@ -268,9 +274,7 @@ class Swimmer:
             "run a whole gait by the direct tier",
         )
         settings = self._settings("tolerance", "backend")
-        return rft.body_velocity(
-            self.medium, self.body, alpha, alphadot, start=start, **settings
-        )
+        return rft.BodyVelocity(self.medium, self.body, **settings)
 
     def velocity(
         self, alpha: ArrayLike, alphadot: ArrayLike, start: ArrayLike | None = None
