@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import functools
 import operator
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar, NamedTuple, Self
 
@@ -95,6 +95,11 @@ class Effect:
     metres : fields in body lengths, and for each the field that gives it in metres, of
         a body with a ``length``.
     required : fields without a default that follow one with.
+    element_update : for an effect whose state is numbers of the body's elements
+        (k, n, B), a formula of one element in place of `after` (a function that
+        ``rft.formulas.vectors.formula`` marks, as a staticmethod): its arguments are
+        those of `element_arguments`, then v_t, v_n and v_w after the step, and it
+        returns the k new numbers. It is compiled where balances are.
 
     Examples
     --------
@@ -116,6 +121,7 @@ class Effect:
     varies_along = odd = False
     metres: ClassVar[Mapping[str, InMetres]] = {}
     required = ()
+    element_update: ClassVar[Callable[..., tuple] | None] = None
 
     def check_lengths(self) -> None:
         """Raise ValueError unless each length is given once, in body lengths or in
@@ -222,7 +228,18 @@ class Effect:
     def after(self, problem: Problem, site: Site, state: Any, v: tuple) -> Any:
         """Return the state after a step that ended with velocities v = (v_t, v_n, v_w)
         of the body's elements."""
-        return state
+        if self.element_update is None:
+            return state
+        return np.array(
+            self.element_update(*self.element_arguments(problem, site, state), *v)
+        )
+
+    def element_arguments(
+        self, problem: Problem, site: Site, state: Any
+    ) -> tuple[np.ndarray, ...]:
+        """Return the first arguments of `element_update`, arrays that broadcast to
+        (n, B)."""
+        raise NotImplementedError
 
     def with_velocity_change(
         self,

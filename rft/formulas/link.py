@@ -380,12 +380,47 @@ def developed_share(direction, before, now, at_once, step):
 
 
 @formula
+def part_speed(sign, v_n, v_w, inside):
+    """Return the mean speed across of the part of an element that moves left (sign 1)
+    or right (sign -1), 0 where there is none; inside: as in `find_pivot`."""
+    return where(inside, 0.5 * (sign * v_n + absolute(v_w)), maximum(sign * v_n, 0.0))
+
+
+@formula
+def directions_after(
+    along, across, v_t_before, v_n_before, step_along, step_across, v_t, v_n, v_w
+):
+    """Return the mean directions of an element's travel, along and across, after a step
+    that ends with velocities (v_t, v_n, v_w).
+
+    Other arguments as in `Memory`. The direction across is the mean of those of the
+    parts that move left and right."""
+    sign = where(v_t >= 0.0, 1.0, -1.0)
+    forward, _ = developed_direction(
+        sign * along, sign * v_t_before, absolute(v_t), step_along
+    )
+    _, inside, _ = find_pivot(v_n, v_w)
+    left, _ = developed_direction(
+        across, v_n_before, part_speed(1.0, v_n, v_w, inside), step_across
+    )
+    right, _ = developed_direction(
+        -across, -v_n_before, part_speed(-1.0, v_n, v_w, inside), step_across
+    )
+    # The left part's fraction of the length.
+    fraction = where(
+        inside,
+        0.5 * (1.0 + v_n / where(inside, absolute(v_w), 1.0)),
+        where(v_n > 0.0, 1.0, 0.0),
+    )
+    return sign * forward, fraction * left - (1.0 - fraction) * right
+
+
+@formula
 def share_across(sign, intact, v_n, v_w, memory):
     """Return the share of the drag across on the part of an element that moves left
     (sign 1) or right (sign -1), and its slopes in v_n and v_w."""
     _, inside, _ = find_pivot(v_n, v_w)
-    # Mean velocity of the part.
-    now = where(inside, 0.5 * (sign * v_n + absolute(v_w)), maximum(sign * v_n, 0.0))
+    now = part_speed(sign, v_n, v_w, inside)
     direction = sign * memory.across
     before = sign * memory.v_n_before
     value, slope = developed_share(
