@@ -43,6 +43,29 @@ def kernels_of(Law: type) -> Kernels:
     return Kernels(kernels.kernel(Law), kernels.net_kernel(Law))
 
 
+@functools.cache
+def element_kernel(formula: Callable, count: int) -> Callable:
+    """Return the compiled update of numbers of elements by a formula with ``count``
+    arguments, and load numba where it is not built yet."""
+    built = ahead.element_kernel(formula)
+    if built is not None:
+        return built
+
+    from rft.balance import kernels
+
+    return kernels.element_kernel(formula, count)
+
+
+def element_update(
+    formula: Callable, arguments: tuple[np.ndarray, ...], shape: tuple[int, int, int]
+) -> np.ndarray:
+    """Return the k numbers of all elements, of shape (k, n, B), by a formula of arrays
+    that broadcast to (n, B)."""
+    out = np.empty(shape)
+    element_kernel(formula, len(arguments))(plain_arrays(arguments), out)
+    return out
+
+
 def plain(x) -> np.ndarray:
     """Return an array as doubles in C order that may be written to, the only form that
     kernels are compiled for."""

@@ -39,6 +39,7 @@ from rft.formulas.simd import (
     add_vector,
     any_of,
     load,
+    of_one_element,
     record_access,
     register_formulas,
     store,
@@ -347,3 +348,23 @@ def net_kernel(Law: type):
             out[:, first : first + count] = sums[:SLOWEST2, :count]
 
     return cached(net_at, f"walks along solutions for laws of the form {Law.__name__}")
+
+
+@functools.cache
+def element_kernel(formula, count: int):
+    """Return the compiled update of numbers of elements by a formula with ``count``
+    arguments (`rft.effects.Effect.element_update`).
+
+    formula: as a function that returns the new numbers of one element."""
+    register_formulas()
+    new_numbers = of_one_element(formula, count)
+
+    @njit(nogil=True, error_model="numpy")
+    def update(arguments, out):
+        for e in range(out.shape[1]):
+            for i in range(out.shape[2]):
+                new = new_numbers(arguments, e, i)
+                for j in range(len(new)):
+                    out[j, e, i] = new[j]
+
+    return cached(update, f"the update of an effect by {formula.__name__}")

@@ -3,6 +3,7 @@ travel (paper Sec. IV A)."""
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -128,14 +129,27 @@ class Transient(Effect):
         """Return the e-foldings of the directions along and across over a step (1, B)
         at unit speed; inf without travel, and at the first step: a body begins as if it
         had always moved as it does then."""
-        travel = np.atleast_2d(self.travel)
-
-        def e_foldings(x):
-            count = E_FOLDINGS * dt / np.maximum(x, SHORTEST)
-            return np.where((x > 0) & (dt > 0), count, np.inf)
-
-        return e_foldings(self.ratio * travel), e_foldings(travel)
+        return e_foldings(self.ratio * self.travel, dt), e_foldings(self.travel, dt)
 
     @classmethod
     def examples(cls, x: float = 0.3) -> dict[str, Transient]:
         return {"transient": cls(travel=2 * x)}
+
+
+def e_foldings(travel: float | np.ndarray, dt: float) -> np.ndarray:
+    """Return the e-foldings (1, B) of a mean direction over a step at unit speed; inf
+    without travel or step."""
+    if isinstance(travel, float):
+        return _e_foldings_of_one(travel, dt)
+    return _e_foldings(np.atleast_2d(travel), dt)
+
+
+def _e_foldings(travel: np.ndarray, dt: float) -> np.ndarray:
+    count = E_FOLDINGS * dt / np.maximum(travel, SHORTEST)
+    return np.where((travel > 0) & (dt > 0), count, np.inf)
+
+
+@functools.lru_cache
+def _e_foldings_of_one(travel: float, dt: float) -> np.ndarray:
+    # The same at every step, and as long to compute as all elements' directions.
+    return _e_foldings(np.array([[travel]]), dt)

@@ -465,6 +465,24 @@ def record_access(kind):
     )
 
 
+def of_one_element(formula, count: int):
+    """Return f(arguments, e, i), a formula of the entries (e, i) of ``count`` arrays
+    (n, B), of which a single row or column stands for all."""
+    entries = ", ".join(f"entry(arguments[{j}], e, i)" for j in range(count))
+    function = _function_from_source(
+        "of_one_element",
+        ["arguments, e, i", f"    return formula({entries})"],
+        formula=formula,
+        entry=_entry,
+    )
+    return register_jitable(forceinline=True)(function)
+
+
+@register_jitable(forceinline=True)
+def _entry(x, e, i):
+    return x[min(e, x.shape[0] - 1), min(i, x.shape[1] - 1)]
+
+
 @overload(vectors.over_nodes, inline="never")
 def _over_nodes(load):
     return lambda load: load

@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rft.balance.arrays import frame_net, velocities, with_frame_velocity
-from rft.balance.backend import check
-from rft.balance.solver import Accuracy, Solutions, solve
+from rft.balance.backend import check, updates_compiled
+from rft.balance.solver import Accuracy, Solutions, compiled_driver, solve
 from rft.balance.velocity import checked_input
 from rft.bodies.base import Body, body_size, half_lengths, joint_speed
 from rft.bodies.pieces import PIECES
@@ -239,7 +239,7 @@ def _cycles(
     for cycle in itertools.count(1):
         start = stepping.memory(state)
         state, rows = advance(stepping, state, stepping.phases, with_work)
-        pose = np.stack([*(row.pose for row in rows), stepping.site(state).pose])
+        pose = np.stack([*(row.pose for row in rows), stepping.next_pose(state)])
         if with_path:
             path.append(pose[:-1])
         if mixes and cycle > 1:  # before the first step there is no memory
@@ -285,8 +285,9 @@ def _integrated(pose: np.ndarray, xi: np.ndarray, dt: float) -> np.ndarray:
     """Return the pose (3, B) reached from a pose at a constant body velocity xi (3, B)
     after dt."""
     half = 0.5 * dt * xi[2]
-    direction = np.exp(1j * (pose[2] + half))
-    z = dt * np.sinc(half / np.pi) * direction * (xi[0] + 1j * xi[1])
+    nonzero = np.where(half == 0.0, 1.0, half)
+    sinc = np.where(half == 0.0, 1.0, np.sin(nonzero) / nonzero)
+    z = dt * sinc * np.exp(1j * (pose[2] + half)) * (xi[0] + 1j * xi[1])
     return pose + np.array([z.real, z.imag, dt * xi[2]])
 
 
@@ -372,6 +373,11 @@ class Stepping:
         self.phases = len(alpha)
         self.dt = 2 * np.pi / self.phases
         self.heavy = bool(broken_premises(self.effects) & Premise.QUASI_STATIC)
+        # Memory and mass have no effect at the first step.
+        self.first_effects = [not effect.breaks & PAST for effect in self.effects]
+        self.compiled_updates = [
+            updates_compiled(backend, effect, assembly.law) for effect in self.effects
+        ]
         self.drift_tolerance = max(
             [1e-6, *(e.drift_tolerance for e in assembly.effects)]
         )
@@ -410,12 +416,16 @@ class Stepping:
             return 2 * s.xi - s.xi_before
         return s.xi
 
-    def site(self, s: State) -> Site:
-        """Return the predicted site of the next step."""
+    def site(self, s: State, guess: np.ndarray) -> Site:
+        """Return the site of the next step, predicted by a guess of its velocity."""
         count = int(s.count[0, 0])
         dt = self.dt if count else 0.0
-        pose = _integrated(s.pose, (s.xi + self.guess(s)) / 2, dt)
+        pose = _integrated(s.pose, (s.xi + guess) / 2, dt)
         return Site(count, dt, pose, s.v)
+
+    def next_pose(self, s: State) -> np.ndarray:
+        """Return the predicted pose (3, B) at the next step."""
+        return self.site(s, self.guess(s)).pose
 
     def begin(self) -> State:
         """Return the state before the first step, on undisturbed ground."""
@@ -435,28 +445,29 @@ class Stepping:
 
     def step(self, s: State, with_work: bool = False) -> tuple[State, Row]:
         """Return the state after the next step, and its row."""
-        site = self.site(s)
-        first = s.count[0, 0] == 0
+        guess = self.guess(s)
+        site = self.site(s, guess)
+        first = site.count == 0
         k = site.count % self.phases
         undisturbed = self.problem(k)
         problem = undisturbed
-        for effect, state in zip(self.effects, s.effect_states):
-            # Memory and mass have no effect at the first step.
-            if not first or not effect.breaks & PAST:
+        for effect, state, acts in zip(
+            self.effects, s.effect_states, self.first_effects
+        ):
+            if acts or not first:
                 problem = effect.apply(problem, site, state)
 
-        guess = None
-        if not first:
-            guess = self.guess(s)
-        solved = self._solved(problem, self.scales[k], guess)
+        solved = self._solved(problem, self.scales[k], None if first else guess)
         xi = solved.xi
         pose = s.pose
         if not first:
             pose = _integrated(pose, (s.xi + xi) / 2, self.dt)
         v = _velocities(problem, xi)
         states = tuple(
-            e.after(problem, site, state, v)
-            for e, state in zip(self.effects, s.effect_states)
+            self._state_after(e, is_compiled, problem, site, state, v)
+            for e, is_compiled, state in zip(
+                self.effects, self.compiled_updates, s.effect_states
+            )
         )
         work = None
         if with_work:
@@ -484,10 +495,27 @@ class Stepping:
             problem_at, scale, self.accuracy, self.assembly, self.backend, 1, guess
         )
 
+    def _state_after(
+        self,
+        effect: Effect,
+        is_compiled: bool,
+        problem: Problem,
+        site: Site,
+        state: Any,
+        v: tuple,
+    ) -> Any:
+        """Return `Effect.after`, by compiled code where that is asked for."""
+        if not is_compiled:
+            return effect.after(problem, site, state, v)
+        arguments = effect.element_arguments(problem, site, state)
+        return compiled_driver().element_update(
+            effect.element_update, (*arguments, *v), state.shape
+        )
+
     def _after_cycle(self, s: State, problem: Problem, site: Site) -> State:
         """Return the state at the end of a cycle with a new record of cycles,
         extrapolated if cycles are to repeat."""
-        displacement = _relative_pose(s.cycles.pose, self.site(s).pose)
+        displacement = _relative_pose(s.cycles.pose, self.next_pose(s))
         if not self.heavy:
             cycles = limit_cycle.after_massless_cycle(s.cycles, displacement)
             return s._replace(cycles=cycles)
