@@ -31,6 +31,7 @@ from rft.core.premise import Premise
 from rft.core.refusal import require
 from rft.effects.base import PAST, Effect, Site, broken_premises, stepwise_effects
 from rft.effects.contact import Assembly, Problem, assemble
+from rft.formulas.link import TINY
 from rft.formulas.newton import to_element
 from rft.laws.base import Medium
 from rft.motion import limit_cycle
@@ -285,9 +286,9 @@ def _integrated(pose: np.ndarray, xi: np.ndarray, dt: float) -> np.ndarray:
     """Return the pose (3, B) reached from a pose at a constant body velocity xi (3, B)
     after dt."""
     half = 0.5 * dt * xi[2]
-    nonzero = np.where(half == 0.0, 1.0, half)
-    sinc = np.where(half == 0.0, 1.0, np.sin(nonzero) / nonzero)
-    z = dt * sinc * np.exp(1j * (pose[2] + half)) * (xi[0] + 1j * xi[1])
+    nonzero = half + TINY
+    chord = dt * np.sin(nonzero) / nonzero  # over the arc
+    z = chord * np.exp(1j * (pose[2] + half)) * (xi[0] + 1j * xi[1])
     return pose + np.array([z.real, z.imag, dt * xi[2]])
 
 
@@ -385,9 +386,8 @@ class Stepping:
     @cached_property
     def scales(self) -> np.ndarray:
         """Scales of speed at all phases, (N, B)."""
-        speed = np.stack(
-            [joint_speed(self.assembly.body, rates) for rates in self.alphadot]
-        )
+        rates = _phase_after_phase(self.alphadot)
+        speed = joint_speed(self.assembly.body, rates).reshape(self.phases, -1)
         rms = np.sqrt((speed**2).mean(0))
         rms = np.where(rms > 0, rms, 1.0)
         if self.heavy:  # a heavy body moves while its joints pause
@@ -396,10 +396,15 @@ class Stepping:
 
     @cached_property
     def _stored_problems(self) -> list[Problem]:
-        return [self._problem(k) for k in range(self.phases)]
-
-    def _problem(self, k: int) -> Problem:
-        return self.assembly.problem(self.alpha[k], self.alphadot[k], self.scales[k])
+        # As one batch, for many small ones take longer.
+        samples = np.arange(self.alpha.shape[-1])
+        assembly = self.assembly.take(np.tile(samples, self.phases))
+        problem = assembly.problem(
+            _phase_after_phase(self.alpha),
+            _phase_after_phase(self.alphadot),
+            self.scales.ravel(),
+        )
+        return problem.split(self.phases)
 
     def problem(self, k: int) -> Problem:
         """Return the balance at the phase 2 pi k / N, without effects that depend on
@@ -407,7 +412,7 @@ class Stepping:
         size = self.assembly.n_law_points * self.phases * self.alpha.shape[-1]
         if size <= MOST_STORED:
             return self._stored_problems[k]
-        return self._problem(k)
+        return self.assembly.problem(self.alpha[k], self.alphadot[k], self.scales[k])
 
     def guess(self, s: State) -> np.ndarray:
         """Return a guess of the velocity (3, B) at the next step, by linear
@@ -578,6 +583,11 @@ class Stepping:
         v = with_frame_velocity(problem, velocities(problem), *scaled)
         rounding = np.full(xi.shape[1], self.accuracy.rounding)
         return np.stack(frame_net(problem, v, rounding, *scaled).force)
+
+
+def _phase_after_phase(x: np.ndarray) -> np.ndarray:
+    """Return values (N, joints, B) as those of N B samples, (joints, N B)."""
+    return np.moveaxis(x, 0, 1).reshape(x.shape[1], -1)
 
 
 def _velocities(problem: Problem, xi: np.ndarray) -> tuple:
