@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.balance import ahead
+from rft.bodies.base import Elements
 from rft.effects.contact import NO_FACTOR, Problem, mapped
 from rft.formulas.momentum import frame_inertia
 from rft.formulas.newton import RESULT_ROWS, Descent, Limits, Net, with_momentum
@@ -41,6 +42,26 @@ def kernels_of(Law: type) -> Kernels:
     from rft.balance import kernels
 
     return Kernels(kernels.kernel(Law), kernels.net_kernel(Law))
+
+
+@functools.cache
+def velocity_kernel() -> Callable:
+    """Return the compiled velocities of elements, and load numba where it is not built
+    yet."""
+    if ahead.library() is not None:
+        return ahead.library().velocities_of_elements
+
+    from rft.balance import kernels
+
+    return kernels.velocity_kernel()
+
+
+def element_velocities(elements: Elements, xi: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return the velocities (v_t, v_n, v_w) of elements, (n, B) each, at a body
+    velocity xi (3, B)."""
+    out = np.empty((3, len(elements.c), xi.shape[1]))
+    velocity_kernel()(plain_arrays(elements), plain(xi), out)
+    return tuple(out)
 
 
 @functools.cache

@@ -351,6 +351,25 @@ def net_kernel(Law: type):
 
 
 @functools.cache
+def velocity_kernel():
+    """Return the compiled velocities of elements at a velocity of the frame."""
+    register_formulas()
+    element = of_one_element(Elements, len(Elements._fields))
+
+    @njit(nogil=True, error_model="numpy")
+    def velocities(elements, xi, out):
+        for e in range(out.shape[1]):
+            for i in range(out.shape[2]):
+                straight = element(elements, e, i)
+                v = to_element(straight, xi[0, i], xi[1, i], xi[2, i])
+                out[0, e, i] = straight.v_t + v[0]
+                out[1, e, i] = straight.v_n + v[1]
+                out[2, e, i] = straight.v_w + v[2]
+
+    return cached(velocities, "the velocities of elements")
+
+
+@functools.cache
 def element_kernel(formula, count: int):
     """Return the compiled update of numbers of elements by a formula with ``count``
     arguments (`rft.effects.Effect.element_update`).

@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rft.balance.arrays import frame_net, velocities, with_frame_velocity
-from rft.balance.backend import check, updates_compiled
-from rft.balance.solver import Accuracy, Solutions, compiled_driver, solve
+from rft.balance.backend import check, solves_compiled, updates_compiled
+from rft.balance.solver import Accuracy, Solutions, compiled_driver, from_guess, solve
 from rft.balance.velocity import checked_input
-from rft.bodies.base import Body, body_size, half_lengths, joint_speed
+from rft.bodies.base import Body, Elements, body_size, half_lengths, joint_speed
 from rft.bodies.pieces import PIECES
 from rft.core.checks import in_range
 from rft.core.premise import Premise
@@ -369,6 +369,7 @@ class Stepping:
         self.alphadot = alphadot
         self.accuracy = accuracy
         self.backend = backend
+        self.is_compiled = solves_compiled(backend, assembly.law)
         self.to_limit = to_limit
         self.body_halves = body_halves
         self.phases = len(alpha)
@@ -467,7 +468,7 @@ class Stepping:
         pose = s.pose
         if not first:
             pose = _integrated(pose, (s.xi + xi) / 2, self.dt)
-        v = _velocities(problem, xi)
+        v = self._velocities(problem.sides.elements, xi)
         states = tuple(
             self._state_after(e, is_compiled, problem, site, state, v)
             for e, is_compiled, state in zip(
@@ -491,14 +492,25 @@ class Stepping:
     def _solved(
         self, problem: Problem, scale: np.ndarray, guess: np.ndarray | None
     ) -> Solutions:
+        balance = self.accuracy, self.assembly, self.backend
+        if guess is not None:
+            found = from_guess(problem, scale, *balance, guess)
+            if found is not None:
+                return found
+
         def problem_at(index):
             if index.size == scale.size:
                 return problem
             return problem.take(index)
 
-        return solve(
-            problem_at, scale, self.accuracy, self.assembly, self.backend, 1, guess
-        )
+        return solve(problem_at, scale, *balance, 1, guess)
+
+    def _velocities(self, e: Elements, xi: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return the velocities (v_t, v_n, v_w) of elements, (n, B) each, at a body
+        velocity xi (3, B)."""
+        if self.is_compiled:
+            return compiled_driver().element_velocities(e, xi)
+        return tuple(a + b for a, b in zip((e.v_t, e.v_n, e.v_w), to_element(e, *xi)))
 
     def _state_after(
         self,
@@ -588,10 +600,3 @@ class Stepping:
 def _phase_after_phase(x: np.ndarray) -> np.ndarray:
     """Return values (N, joints, B) as those of N B samples, (joints, N B)."""
     return np.moveaxis(x, 0, 1).reshape(x.shape[1], -1)
-
-
-def _velocities(problem: Problem, xi: np.ndarray) -> tuple:
-    """Return the velocities (v_t, v_n, v_w) of the body's elements, (n, B) each, at a
-    body velocity xi (3, B)."""
-    e = problem.sides.elements
-    return tuple(a + b for a, b in zip((e.v_t, e.v_n, e.v_w), to_element(e, *xi)))
