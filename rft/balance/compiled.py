@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -118,12 +118,51 @@ def kernel_number(x) -> np.ndarray | float:
     return plain(x)
 
 
-def load_arguments(problem: Problem) -> tuple:
+class Known(NamedTuple):
+    """Arguments of kernels by the ids of the records that they are made of, and the
+    problem that these belong to and that keeps them."""
+
+    problem: Problem
+    arguments: dict[int, Any]
+
+
+def known_arguments(problem: Problem) -> Known:
+    """Return the arguments that a problem shares with those that effects make of it at
+    each step."""
+    sides = problem.sides.elements
+    points = problem.points.elements
+    terms = problem.point_terms
+    arguments = {
+        id(problem.law): law_numbers(problem.law),
+        id(sides): plain_arrays(sides),
+        id(points): stacked(points),
+        id(terms): terms_by_point(terms),
+    }
+    return Known(problem, arguments)
+
+
+def law_numbers(law) -> tuple:
+    """Return the numbers of a law's record as kernels take them."""
+    return tuple(map(kernel_number, law))
+
+
+def terms_by_point(terms: np.ndarray) -> np.ndarray:
+    """Return dry terms (T, 3, n, 1) of points as (n, T, 3)."""
+    return plain(terms[..., 0].transpose(2, 0, 1))
+
+
+def load_arguments(problem: Problem, known: Known | None = None) -> tuple:
     """Return the arguments of kernels that describe the loads of a problem: numbers of
     the law; elements, factors, quadratic drag and memory of the ground, and incline of
     sides and of points; dry terms of the points; the frame with the scale of speed;
     additions. Records that do not apply have no rows, for speed."""
     p = problem
+
+    def made(function, record):
+        if known is not None and id(record) in known.arguments:
+            return known.arguments[id(record)]
+        return function(record)
+
     additions = problem.additions
     has_points = len(p.points.station) > 0
     ground = NO_ROWS
@@ -141,13 +180,13 @@ def load_arguments(problem: Problem) -> tuple:
     elements = NO_POINTS
     terms = NO_TERMS
     if has_points:
-        elements = stacked(p.points.elements)
-        terms = plain(p.point_terms[..., 0].transpose(2, 0, 1))
+        elements = made(stacked, p.points.elements)
+        terms = made(terms_by_point, p.point_terms)
 
-    sides = plain_arrays(p.sides.elements), factors[0], ground, inclines[0]
+    sides = made(plain_arrays, p.sides.elements), factors[0], ground, inclines[0]
     points = elements, factors[1], NO_ROWS, inclines[1]
     frame = (*plain_arrays(p.frame), plain(p.law_speed_scale))
-    return tuple(map(kernel_number, p.law)), sides, points, terms, frame, additions
+    return made(law_numbers, p.law), sides, points, terms, frame, additions
 
 
 def nets(
@@ -166,7 +205,11 @@ def nets(
 
 
 def solve(
-    problem: Problem, descent: Descent, limits: Limits, guess: np.ndarray | None
+    problem: Problem,
+    descent: Descent,
+    limits: Limits,
+    guess: np.ndarray | None,
+    known: Known | None = None,
 ) -> np.ndarray:
     """Solve all samples by one descent as `rft.balance.arrays.solve` does."""
     p = problem
@@ -177,6 +220,6 @@ def solve(
     if guess is None:
         guess = NO_GUESS
     guess = plain(guess)
-    arguments = load_arguments(p)
+    arguments = load_arguments(p, known)
     kernels_of(type(p.law)).solve(arguments, mass, guess, descent, limits, out)
     return out

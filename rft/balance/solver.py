@@ -188,31 +188,33 @@ def _limits(problem: Problem, accuracy: Accuracy) -> Limits:
     return Limits(float(accuracy.rounding), float(residual))
 
 
+class Found(NamedTuple):
+    """Solutions from a guess: fields as in `Solutions`."""
+
+    xi: np.ndarray
+    residual: np.ndarray
+    limit: float
+
+
 def from_guess(
     problem: Problem,
     scale: np.ndarray,
     accuracy: Accuracy,
     assembly: Assembly,
-    backend: str,
     guess: np.ndarray,
-) -> Solutions | None:
-    """Return the body velocities that `solve` returns with this guess, in one thread,
-    where Newton's method solves a small batch from it at once, with less work around
-    it; else None."""
-    compiled = solves_compiled(backend, assembly.law)
-    together = max(1, ELEMENTS_TOGETHER // assembly.n_law_points)
-    if scale.size > together:
+    solve_once: Callable,
+) -> Found | None:
+    """Return what `solve` finds with this guess, where Newton's method solves a small
+    batch from it at once, with less work around it; else None.
+
+    solve_once: the function ``solve`` of the driver."""
+    if scale.size > max(1, ELEMENTS_TOGETHER // assembly.n_law_points):
         return None
-    driver = compiled_driver() if compiled else arrays
     limits = _limits(problem, accuracy)
     descent = _begin(WARM, assembly.linear, limits)
-    with np.errstate(over="ignore"):
-        guess = guess / scale
-    results = driver.solve(problem, descent, limits, guess)
-    residual, evaluations, slowest = results[RESIDUAL:]
+    results = solve_once(problem, descent, limits, guess / scale)
+    residual = results[RESIDUAL]
     if not (residual <= limits.residual).all():
         return None
     listener()(scale.size, assembly.n_law_points, assembly.linear)
-    stuck = (slowest < STUCK_BELOW * accuracy.rounding) & (not assembly.linear)
-    xi = results[:3] * scale
-    return Solutions(xi, residual, evaluations, stuck, limits.residual)
+    return Found(results[:3] * scale, residual, limits.residual)

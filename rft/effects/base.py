@@ -43,9 +43,9 @@ class Site(NamedTuple):
     """Place and phase of one time step of B samples, in body lengths and rad.
 
     count: number of steps before this one. dt: phase since the previous step, rad, 0 at
-    the first step. pose: (3, B), predicted pose of the frame on the ground. v_before:
-    velocities (v_t, v_n, v_w) of the body's elements at the previous step, (n, B)
-    each."""
+    the first step. pose: (3, B), predicted pose of the frame on the ground (that at the
+    previous step where no effect reads it). v_before: velocities (v_t, v_n, v_w) of the
+    body's elements at the previous step, (n, B) each."""
 
     count: int
     dt: float
@@ -88,6 +88,8 @@ class Effect:
         sooner; None for a state of another kind.
     memory_size : numbers that time stepping stores for each sample, beside a few for
         each element.
+    reads_place : whether the effect reads `Site.pose`, which is not predicted where no
+        effect does.
     varies_along : whether the effect varies along an element; it then acts by its mean
         over each piece of an element.
     odd : whether the loads that it adds change sign with all velocities (assumed, not
@@ -118,6 +120,7 @@ class Effect:
     drift_tolerance = 1e-6
     memory_bounds: ClassVar[tuple[float, float] | None] = None
     memory_size = 0
+    reads_place = True
     varies_along = odd = False
     metres: ClassVar[Mapping[str, InMetres]] = {}
     required = ()

@@ -92,6 +92,7 @@ class Transient(Effect):
     )
     batched = ("travel", "at_once", "ratio", "at_once_along", "travel_m")
     memory_bounds = (-1.0, 1.0)
+    reads_place = False
     varies_along = True
     element_update = staticmethod(directions_after)
 

@@ -14,15 +14,23 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rft.balance import arrays
 from rft.balance.arrays import frame_net, velocities, with_frame_velocity
 from rft.balance.backend import check, solves_compiled, updates_compiled
-from rft.balance.solver import Accuracy, Solutions, compiled_driver, from_guess, solve
+from rft.balance.solver import (
+    Accuracy,
+    Found,
+    Solutions,
+    compiled_driver,
+    from_guess,
+    solve,
+)
 from rft.balance.velocity import checked_input
 from rft.bodies.base import Body, Elements, body_size, half_lengths, joint_speed
 from rft.bodies.pieces import PIECES
@@ -285,11 +293,13 @@ def _relative_pose(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def _integrated(pose: np.ndarray, xi: np.ndarray, dt: float) -> np.ndarray:
     """Return the pose (3, B) reached from a pose at a constant body velocity xi (3, B)
     after dt."""
-    half = 0.5 * dt * xi[2]
-    nonzero = half + TINY
-    chord = dt * np.sin(nonzero) / nonzero  # over the arc
-    z = chord * np.exp(1j * (pose[2] + half)) * (xi[0] + 1j * xi[1])
-    return pose + np.array([z.real, z.imag, dt * xi[2]])
+    moved = dt * xi
+    half = 0.5 * moved[2]
+    chord = np.sin(half + TINY) / (half + TINY)  # over the arc
+    z = chord * np.exp(1j * (pose[2] + half)) * (moved[0] + 1j * moved[1])
+    moved[0] = z.real
+    moved[1] = z.imag
+    return pose + moved
 
 
 def _with_batch_axes(steps: TimeSteps, batch: tuple, length: float) -> TimeSteps:
@@ -369,6 +379,9 @@ class Stepping:
         self.alphadot = alphadot
         self.accuracy = accuracy
         self.backend = backend
+        size = assembly.n_law_points * alpha.shape[0] * alpha.shape[-1]
+        self._stores_problems = size <= MOST_STORED
+        self._known: dict[int, Any] = {}  # what the compiled driver knows by phase
         self.is_compiled = solves_compiled(backend, assembly.law)
         self.to_limit = to_limit
         self.body_halves = body_halves
@@ -377,6 +390,7 @@ class Stepping:
         self.heavy = bool(broken_premises(self.effects) & Premise.QUASI_STATIC)
         # Memory and mass have no effect at the first step.
         self.first_effects = [not effect.breaks & PAST for effect in self.effects]
+        self.reads_place = any(effect.reads_place for effect in self.effects)
         self.compiled_updates = [
             updates_compiled(backend, effect, assembly.law) for effect in self.effects
         ]
@@ -410,8 +424,7 @@ class Stepping:
     def problem(self, k: int) -> Problem:
         """Return the balance at the phase 2 pi k / N, without effects that depend on
         the past or the place."""
-        size = self.assembly.n_law_points * self.phases * self.alpha.shape[-1]
-        if size <= MOST_STORED:
+        if self._stores_problems:
             return self._stored_problems[k]
         return self.assembly.problem(self.alpha[k], self.alphadot[k], self.scales[k])
 
@@ -426,12 +439,14 @@ class Stepping:
         """Return the site of the next step, predicted by a guess of its velocity."""
         count = int(s.count[0, 0])
         dt = self.dt if count else 0.0
-        pose = _integrated(s.pose, (s.xi + guess) / 2, dt)
+        pose = s.pose
+        if self.reads_place:
+            pose = _integrated(pose, (s.xi + guess) / 2, dt)
         return Site(count, dt, pose, s.v)
 
     def next_pose(self, s: State) -> np.ndarray:
         """Return the predicted pose (3, B) at the next step."""
-        return self.site(s, self.guess(s)).pose
+        return _integrated(s.pose, (s.xi + self.guess(s)) / 2, self.dt)
 
     def begin(self) -> State:
         """Return the state before the first step, on undisturbed ground."""
@@ -463,7 +478,7 @@ class Stepping:
             if acts or not first:
                 problem = effect.apply(problem, site, state)
 
-        solved = self._solved(problem, self.scales[k], None if first else guess)
+        solved = self._solved(k, problem, None if first else guess)
         xi = solved.xi
         pose = s.pose
         if not first:
@@ -490,11 +505,13 @@ class Stepping:
         return after, Row(xi, pose, solved.residual, np.array([solved.limit]), work)
 
     def _solved(
-        self, problem: Problem, scale: np.ndarray, guess: np.ndarray | None
-    ) -> Solutions:
-        balance = self.accuracy, self.assembly, self.backend
+        self, k: int, problem: Problem, guess: np.ndarray | None
+    ) -> Solutions | Found:
+        scale = self.scales[k]
         if guess is not None:
-            found = from_guess(problem, scale, *balance, guess)
+            found = from_guess(
+                problem, scale, self.accuracy, self.assembly, guess, self._solve_once(k)
+            )
             if found is not None:
                 return found
 
@@ -503,7 +520,20 @@ class Stepping:
                 return problem
             return problem.take(index)
 
-        return solve(problem_at, scale, *balance, 1, guess)
+        return solve(
+            problem_at, scale, self.accuracy, self.assembly, self.backend, 1, guess
+        )
+
+    def _solve_once(self, k: int) -> Callable:
+        """Return the solver of one descent for balances at the phase 2 pi k / N."""
+        if not self.is_compiled:
+            return arrays.solve
+        driver = compiled_driver()
+        if not self._stores_problems:
+            return driver.solve
+        if k not in self._known:
+            self._known[k] = driver.known_arguments(self._stored_problems[k])
+        return partial(driver.solve, known=self._known[k])
 
     def _velocities(self, e: Elements, xi: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return the velocities (v_t, v_n, v_w) of elements, (n, B) each, at a body
