@@ -114,8 +114,8 @@ class Transient(Effect):
             across=across,
             v_t_before=v_t_before,
             v_n_before=v_n_before,
-            at_once_along=np.atleast_2d(self.at_once_along),
-            at_once_across=np.atleast_2d(self.at_once),
+            at_once_along=np.array(self.at_once_along, ndmin=2),
+            at_once_across=np.array(self.at_once, ndmin=2),
             step_along=step_along,
             step_across=step_across,
         )

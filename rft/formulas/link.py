@@ -29,6 +29,7 @@ import numpy as np
 
 from rft.formulas.vectors import (
     absolute,
+    anywhere,
     copysign,
     exp,
     formula,
@@ -486,17 +487,18 @@ def two_sided_load(law, v_t, v_n, v_w, rounding, memory):
 
     The drag across vanishes at the pivot, so that its motion does not contribute to the
     slopes."""
-    pivot, _, u_head = find_pivot(v_n, v_w)
+    pivot, inside, u_head = find_pivot(v_n, v_w)
     left = share_across(1.0, memory.intact_left, v_n, v_w, memory)
     right = share_across(-1.0, memory.intact_right, v_n, v_w, memory)
     leftward = u_head > 0.0
-    head = part_load(
+    load = part_load(
         law, v_t, v_n, v_w, rounding, pivot, 1.0, select_triple(leftward, left, right)
     )
-    tail = part_load(
-        law, v_t, v_n, v_w, rounding, -1.0, pivot, select_triple(leftward, right, left)
-    )
-    return with_share_along(sum_loads(head, tail), v_t, memory)
+    if anywhere(inside):  # else nothing lies on the tail's side
+        share = select_triple(leftward, right, left)
+        tail = part_load(law, v_t, v_n, v_w, rounding, -1.0, pivot, share)
+        load = sum_loads(load, tail)
+    return with_share_along(load, v_t, memory)
 
 
 @formula

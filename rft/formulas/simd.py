@@ -461,6 +461,13 @@ def any_of(context, x):
     return types.boolean(x), emit
 
 
+@overload(vectors.anywhere)
+def _anywhere(condition):
+    if condition == mask:
+        return lambda condition: any_of(condition)
+    return lambda condition: condition
+
+
 @intrinsic
 def _gather(context, table, row, column):
     """Return table[row, column] of an array (n, m) for a vector of eight integers
