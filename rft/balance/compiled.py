@@ -65,16 +65,16 @@ def element_velocities(elements: Elements, xi: np.ndarray) -> tuple[np.ndarray, 
 
 
 @functools.cache
-def element_kernel(formula: Callable, count: int) -> Callable:
-    """Return the compiled update of numbers of elements by a formula with ``count``
-    arguments, and load numba where it is not built yet."""
+def element_kernel(formula: Callable) -> Callable:
+    """Return the compiled update of numbers of elements by a formula, and load numba
+    where it is not built yet."""
     built = ahead.element_kernel(formula)
     if built is not None:
         return built
 
     from rft.balance import kernels
 
-    return kernels.element_kernel(formula, count)
+    return kernels.element_kernel(formula)
 
 
 def element_update(
@@ -83,7 +83,7 @@ def element_update(
     """Return the k numbers of all elements, of shape (k, n, B), by a formula of arrays
     that broadcast to (n, B)."""
     out = np.empty(shape)
-    element_kernel(formula, len(arguments))(plain_arrays(arguments), out)
+    element_kernel(formula)(plain_arrays(arguments), out)
     return out
 
 

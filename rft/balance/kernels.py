@@ -11,6 +11,7 @@ this module loads numba.
 from __future__ import annotations
 
 import functools
+import inspect
 
 import numpy as np
 from numba import njit
@@ -370,13 +371,11 @@ def velocity_kernel():
 
 
 @functools.cache
-def element_kernel(formula, count: int):
-    """Return the compiled update of numbers of elements by a formula with ``count``
-    arguments (`rft.effects.Effect.element_update`).
-
-    formula: as a function that returns the new numbers of one element."""
+def element_kernel(formula):
+    """Return the compiled update of numbers of elements by a formula
+    (`rft.effects.Effect.element_update`)."""
     register_formulas()
-    new_numbers = of_one_element(formula, count)
+    new_numbers = of_one_element(formula, len(inspect.signature(formula).parameters))
 
     @njit(nogil=True, error_model="numpy")
     def update(arguments, out):
