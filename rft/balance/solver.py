@@ -188,14 +188,6 @@ def _limits(problem: Problem, accuracy: Accuracy) -> Limits:
     return Limits(float(accuracy.rounding), float(residual))
 
 
-class Found(NamedTuple):
-    """Solutions from a guess: fields as in `Solutions`."""
-
-    xi: np.ndarray
-    residual: np.ndarray
-    limit: float
-
-
 def from_guess(
     problem: Problem,
     scale: np.ndarray,
@@ -203,18 +195,16 @@ def from_guess(
     assembly: Assembly,
     guess: np.ndarray,
     solve_once: Callable,
-) -> Found | None:
-    """Return what `solve` finds with this guess, where Newton's method solves a small
-    batch from it at once, with less work around it; else None.
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return xi, residual and limit as of `Solutions`, as Newton's method finds them
+    from a guess: what `solve` does first, with less work around it, for a small batch.
 
     solve_once: the function ``solve`` of the driver."""
-    if scale.size > max(1, ELEMENTS_TOGETHER // assembly.n_law_points):
-        return None
     limits = _limits(problem, accuracy)
     descent = _begin(WARM, assembly.linear, limits)
-    results = solve_once(problem, descent, limits, guess / scale)
-    residual = results[RESIDUAL]
-    if not (residual <= limits.residual).all():
-        return None
-    listener()(scale.size, assembly.n_law_points, assembly.linear)
-    return Found(results[:3] * scale, residual, limits.residual)
+    with np.errstate(over="ignore"):
+        guess = guess / scale
+    results = solve_once(problem, descent, limits, guess)
+    solved = np.count_nonzero(results[RESIDUAL] <= limits.residual)
+    listener()(solved, assembly.n_law_points, assembly.linear)
+    return results[:3] * scale, results[RESIDUAL], limits.residual

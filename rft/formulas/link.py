@@ -417,10 +417,10 @@ def directions_after(
 
 
 @formula
-def share_across(sign, intact, v_n, v_w, memory):
+def share_across(sign, intact, v_n, v_w, inside, memory):
     """Return the share of the drag across on the part of an element that moves left
-    (sign 1) or right (sign -1), and its slopes in v_n and v_w."""
-    _, inside, _ = find_pivot(v_n, v_w)
+    (sign 1) or right (sign -1), and its slopes in v_n and v_w; inside: as in
+    `find_pivot`."""
     now = part_speed(sign, v_n, v_w, inside)
     direction = sign * memory.across
     before = sign * memory.v_n_before
@@ -488,8 +488,8 @@ def two_sided_load(law, v_t, v_n, v_w, rounding, memory):
     The drag across vanishes at the pivot, so that its motion does not contribute to the
     slopes."""
     pivot, inside, u_head = find_pivot(v_n, v_w)
-    left = share_across(1.0, memory.intact_left, v_n, v_w, memory)
-    right = share_across(-1.0, memory.intact_right, v_n, v_w, memory)
+    left = share_across(1.0, memory.intact_left, v_n, v_w, inside, memory)
+    right = share_across(-1.0, memory.intact_right, v_n, v_w, inside, memory)
     leftward = u_head > 0.0
     load = part_load(
         law, v_t, v_n, v_w, rounding, pivot, 1.0, select_triple(leftward, left, right)

@@ -24,8 +24,8 @@ from rft.balance import arrays
 from rft.balance.arrays import frame_net, velocities, with_frame_velocity
 from rft.balance.backend import check, solves_compiled, updates_compiled
 from rft.balance.solver import (
+    ELEMENTS_TOGETHER,
     Accuracy,
-    Found,
     Solutions,
     compiled_driver,
     from_guess,
@@ -381,6 +381,7 @@ class Stepping:
         self.backend = backend
         size = assembly.n_law_points * alpha.shape[0] * alpha.shape[-1]
         self._stores_problems = size <= MOST_STORED
+        self._is_small = assembly.n_law_points * alpha.shape[-1] <= ELEMENTS_TOGETHER
         self._known: dict[int, Any] = {}  # what the compiled driver knows by phase
         self.is_compiled = solves_compiled(backend, assembly.law)
         self.to_limit = to_limit
@@ -478,8 +479,7 @@ class Stepping:
             if acts or not first:
                 problem = effect.apply(problem, site, state)
 
-        solved = self._solved(k, problem, None if first else guess)
-        xi = solved.xi
+        xi, residual, limit = self._solved(k, problem, None if first else guess)
         pose = s.pose
         if not first:
             pose = _integrated(pose, (s.xi + xi) / 2, self.dt)
@@ -502,26 +502,50 @@ class Stepping:
         after = State(s.count + 1, pose, xi, s.xi, v, states, cycles)
         if k == self.phases - 1:
             after = self._after_cycle(after, undisturbed, site)
-        return after, Row(xi, pose, solved.residual, np.array([solved.limit]), work)
+        return after, Row(xi, pose, residual, np.array([limit]), work)
 
     def _solved(
         self, k: int, problem: Problem, guess: np.ndarray | None
-    ) -> Solutions | Found:
+    ) -> tuple[np.ndarray, np.ndarray, float]:
+        """Return body velocities, residuals and the largest residual of a solution, of
+        a balance at the phase 2 pi k / N."""
         scale = self.scales[k]
-        if guess is not None:
-            found = from_guess(
-                problem, scale, self.accuracy, self.assembly, guess, self._solve_once(k)
-            )
-            if found is not None:
-                return found
+        if guess is None or not self._is_small:
+            found = self._solve_all(problem, scale, np.arange(scale.size), guess)
+            return found.xi, found.residual, found.limit
+        xi, residual, limit = from_guess(
+            problem, scale, self.accuracy, self.assembly, guess, self._solve_once(k)
+        )
+        rest = np.flatnonzero(~(residual <= limit))
+        if rest.size:
+            found = self._solve_all(problem, scale, rest)
+            xi[:, rest] = found.xi
+            residual[rest] = found.residual
+            limit = max(limit, found.limit)
+        return xi, residual, limit
+
+    def _solve_all(
+        self,
+        problem: Problem,
+        scale: np.ndarray,
+        samples: np.ndarray,
+        guess: np.ndarray | None = None,
+    ) -> Solutions:
+        """Return the solutions of some samples of a problem."""
 
         def problem_at(index):
             if index.size == scale.size:
                 return problem
-            return problem.take(index)
+            return problem.take(samples[index])
 
         return solve(
-            problem_at, scale, self.accuracy, self.assembly, self.backend, 1, guess
+            problem_at,
+            scale[samples],
+            self.accuracy,
+            self.assembly,
+            self.backend,
+            1,
+            guess,
         )
 
     def _solve_once(self, k: int) -> Callable:
