@@ -451,16 +451,6 @@ def with_share_along(load, v_t, memory):
 
 
 @formula
-def select_triple(condition, x, y):
-    """Return the triple x where the condition holds, y elsewhere."""
-    return (
-        where(condition, x[0], y[0]),
-        where(condition, x[1], y[1]),
-        where(condition, x[2], y[2]),
-    )
-
-
-@formula
 def part_load(law, v_t, v_n, v_w, rounding, low, high, share):
     """Return the load of the part of an element from s = low to high, with a share of
     the drag across, given as (value, slope in v_n, slope in v_w)."""
@@ -488,14 +478,14 @@ def two_sided_load(law, v_t, v_n, v_w, rounding, memory):
     The drag across vanishes at the pivot, so that its motion does not contribute to the
     slopes."""
     pivot, inside, u_head = find_pivot(v_n, v_w)
-    left = share_across(1.0, memory.intact_left, v_n, v_w, inside, memory)
-    right = share_across(-1.0, memory.intact_right, v_n, v_w, inside, memory)
     leftward = u_head > 0.0
-    load = part_load(
-        law, v_t, v_n, v_w, rounding, pivot, 1.0, select_triple(leftward, left, right)
-    )
+    left, right = memory.intact_left, memory.intact_right
+    sign = where(leftward, 1.0, -1.0)
+    share = share_across(sign, where(leftward, left, right), v_n, v_w, inside, memory)
+    load = part_load(law, v_t, v_n, v_w, rounding, pivot, 1.0, share)
     if anywhere(inside):  # else nothing lies on the tail's side
-        share = select_triple(leftward, right, left)
+        intact = where(leftward, right, left)
+        share = share_across(-sign, intact, v_n, v_w, inside, memory)
         tail = part_load(law, v_t, v_n, v_w, rounding, -1.0, pivot, share)
         load = sum_loads(load, tail)
     return with_share_along(load, v_t, memory)
