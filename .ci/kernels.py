@@ -46,8 +46,11 @@ def build(folder: Path, root: Path) -> Path:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # that numba may replace pycc one day
         from numba.pycc import CC
-    from rft import Chain, Granular, body_velocity
+    import numpy as np
+
+    from rft import Chain, Granular, body_velocity, time_steps
     from rft.balance import kernels, walks
+    from rft.effects import EFFECTS
     from rft.laws.records import Terms
 
     # Kernels know their types once they are called; solutions of this law fold at this
@@ -56,6 +59,14 @@ def build(folder: Path, root: Path) -> Path:
     shape = (-1.47053323, -1.9356507)
     rate = (-0.99735926, -0.07262584)
     body_velocity(law, Chain(), shape, rate, backend="numba")
+    updated = [EFFECTS[name] for name in sorted(EFFECTS.built_in)]
+    updated = [effect for effect in updated if effect.element_update is not None]
+    phase = np.linspace(0.0, 2 * np.pi, 8, endpoint=False)[:, None]
+    for kind in updated:
+        effects = [kind.examples()[kind.kind]]
+        gait = np.cos(phase + shape), -np.sin(phase + shape)
+        options = {"effects": effects, "cycles": 1, "backend": "numba"}
+        time_steps(Granular(1.8, 0.24), Chain(), *gait, **options)
     code = CC(NAME)
     code.output_dir = str(folder)
     code.target_cpu = PROCESSOR
@@ -63,6 +74,11 @@ def build(folder: Path, root: Path) -> Path:
         ("solve", kernels.kernel(Terms)),
         ("velocities", kernels.chain_kernel(Terms)),
         ("walk", walks.walk_kernel(Terms)),
+        ("velocities_of_elements", kernels.velocity_kernel()),
+        *(
+            (kind.element_update.__name__, kernels.element_kernel(kind.element_update))
+            for kind in updated
+        ),
     ):
         code.export(name, kernel.signatures[0])(kernel.py_func)
     code.compile()

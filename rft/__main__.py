@@ -9,7 +9,7 @@ from math import radians
 
 import numpy as np
 
-from rft import CATALOGUE, Chain, Granular, body_velocity
+from rft import CATALOGUE, Chain, Granular, Transient, body_velocity, time_steps
 from rft.balance.backend import check, preferring
 from rft.laws.records import record
 from rft.terradynamics.ground import Ground
@@ -31,9 +31,12 @@ FOLDING_RATE = (-0.99735926, -0.07262584)
 
 
 def compile_balances() -> None:
-    """Compile the balance of forces in the horizontal plane."""
+    """Compile the balance of forces in the horizontal plane, and its time steps."""
     body_velocity(LAW, Chain(), (1.0, 1.0), (1.0, 1.0))
     body_velocity(FOLDING_LAW, Chain(), FOLDING_SHAPE, FOLDING_RATE)
+    phase = np.linspace(0.0, 2 * np.pi, 8, endpoint=False)[:, None]
+    circle = np.cos(phase - FOLDING_SHAPE), -np.sin(phase - FOLDING_SHAPE)
+    time_steps(LAW, Chain(), *circle, effects=[Transient(travel=0.1)], cycles=1)
 
 
 def compile_plates() -> None:

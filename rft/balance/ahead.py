@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import importlib
 import importlib.util
+from collections.abc import Callable
 from types import ModuleType
 
 from rft.laws.records import Terms
@@ -28,6 +29,14 @@ def library() -> ModuleType | None:
 def has(Law: type) -> bool:
     """Return whether there are kernels for a class of law records."""
     return Law is Terms and library() is not None
+
+
+def element_kernel(formula: Callable) -> Callable | None:
+    """Return the kernel of an effect's formula of one element; None if there is
+    none."""
+    if not formula.__module__.startswith("rft.formulas."):
+        return None
+    return getattr(library(), formula.__name__, None)
 
 
 def _can_run() -> bool:

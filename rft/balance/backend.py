@@ -14,9 +14,12 @@ import functools
 import importlib.util
 from collections.abc import Iterator
 from contextvars import ContextVar
+from typing import Any
 
 from rft.balance import ahead
 from rft.core.refusal import Refusal, require
+from rft.effects.base import Effect
+from rft.formulas.vectors import is_formula
 from rft.laws.records import is_compilable
 
 BACKENDS = ("auto", "numpy", "numba")
@@ -93,4 +96,15 @@ def solves_compiled(backend: str, law) -> bool:
         backend = preferred()
     if backend != "numpy" and ahead.has(type(law)):
         return True
+    return compiles(backend, law)
+
+
+def updates_compiled(backend: str, effect: Effect, law: Any) -> bool:
+    """Return whether compiled code computes an effect's formula of one element, beside
+    balances of a law, given by its record."""
+    formula = effect.element_update
+    if not is_formula(formula) or type(effect).after is not Effect.after:
+        return False
+    if ahead.element_kernel(formula) is not None:
+        return solves_compiled(backend, law)
     return compiles(backend, law)

@@ -5,11 +5,12 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rft.balance import ahead
+from rft.bodies.base import Elements
 from rft.effects.contact import NO_FACTOR, Problem
 from rft.formulas.momentum import frame_inertia
 from rft.formulas.newton import RESULT_ROWS, Descent, Limits
@@ -45,6 +46,49 @@ def kernels_of(Law: type) -> Kernels:
     )
 
 
+@functools.cache
+def velocity_kernel() -> Callable:
+    """Return the compiled velocities of elements, and load numba where it is not built
+    yet."""
+    if ahead.library() is not None:
+        return ahead.library().velocities_of_elements
+
+    from rft.balance import kernels
+
+    return kernels.velocity_kernel()
+
+
+def element_velocities(elements: Elements, xi: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return the velocities (v_t, v_n, v_w) of elements, (n, B) each, at a body
+    velocity xi (3, B)."""
+    out = np.empty((3, len(elements.c), xi.shape[1]))
+    velocity_kernel()(plain_arrays(elements), plain(xi), out)
+    return tuple(out)
+
+
+@functools.cache
+def element_kernel(formula: Callable) -> Callable:
+    """Return the compiled update of numbers of elements by a formula, and load numba
+    where it is not built yet."""
+    built = ahead.element_kernel(formula)
+    if built is not None:
+        return built
+
+    from rft.balance import kernels
+
+    return kernels.element_kernel(formula)
+
+
+def element_update(
+    formula: Callable, arguments: tuple[np.ndarray, ...], shape: tuple[int, int, int]
+) -> np.ndarray:
+    """Return the k numbers of all elements, of shape (k, n, B), by a formula of arrays
+    that broadcast to (n, B)."""
+    out = np.empty(shape)
+    element_kernel(formula)(plain_arrays(arguments), out)
+    return out
+
+
 def plain(x) -> np.ndarray:
     """Return an array as doubles in C order that may be written to, the only form that
     kernels are compiled for."""
@@ -76,12 +120,51 @@ def kernel_number(x) -> np.ndarray | float:
     return plain(x)
 
 
-def load_arguments(problem: Problem) -> tuple:
+class Known(NamedTuple):
+    """Arguments of kernels by the ids of the records that they are made of, and the
+    problem that these belong to and that keeps them."""
+
+    problem: Problem
+    arguments: dict[int, Any]
+
+
+def known_arguments(problem: Problem) -> Known:
+    """Return the arguments that a problem shares with those that effects make of it at
+    each step."""
+    sides = problem.sides.elements
+    points = problem.points.elements
+    terms = problem.point_terms
+    arguments = {
+        id(problem.law): law_numbers(problem.law),
+        id(sides): plain_arrays(sides),
+        id(points): stacked(points),
+        id(terms): terms_by_point(terms),
+    }
+    return Known(problem, arguments)
+
+
+def law_numbers(law) -> tuple:
+    """Return the numbers of a law's record as kernels take them."""
+    return tuple(map(kernel_number, law))
+
+
+def terms_by_point(terms: np.ndarray) -> np.ndarray:
+    """Return dry terms (T, 3, n, 1) of points as (n, T, 3)."""
+    return plain(terms[..., 0].transpose(2, 0, 1))
+
+
+def load_arguments(problem: Problem, known: Known | None = None) -> tuple:
     """Return the arguments of kernels that describe the loads of a problem: numbers of
     the law; elements, factors, quadratic drag and memory of the ground, and incline of
     sides and of points; dry terms of the points; the frame with the scale of speed;
     additions. Records that do not apply have no rows, for speed."""
     p = problem
+
+    def made(function, record):
+        if known is not None and id(record) in known.arguments:
+            return known.arguments[id(record)]
+        return function(record)
+
     additions = problem.additions
     has_points = len(p.points.station) > 0
     ground = NO_ROWS
@@ -99,17 +182,21 @@ def load_arguments(problem: Problem) -> tuple:
     elements = NO_POINTS
     terms = NO_TERMS
     if has_points:
-        elements = stacked(p.points.elements)
-        terms = plain(p.point_terms[..., 0].transpose(2, 0, 1))
+        elements = made(stacked, p.points.elements)
+        terms = made(terms_by_point, p.point_terms)
 
-    sides = plain_arrays(p.sides.elements), factors[0], ground, inclines[0]
+    sides = made(plain_arrays, p.sides.elements), factors[0], ground, inclines[0]
     points = elements, factors[1], NO_ROWS, inclines[1]
     frame = (*plain_arrays(p.frame), plain(p.law_speed_scale))
-    return tuple(map(kernel_number, p.law)), sides, points, terms, frame, additions
+    return made(law_numbers, p.law), sides, points, terms, frame, additions
 
 
 def solve(
-    problem: Problem, descent: Descent, limits: Limits, guess: np.ndarray | None
+    problem: Problem,
+    descent: Descent,
+    limits: Limits,
+    guess: np.ndarray | None,
+    known: Known | None = None,
 ) -> np.ndarray:
     """Solve all samples by one descent as `rft.balance.arrays.solve` does."""
     p = problem
@@ -117,7 +204,7 @@ def solve(
     if guess is None:
         guess = NO_GUESS
     guess = plain(guess)
-    arguments = load_arguments(p)
+    arguments = load_arguments(p, known)
     kernels_of(type(p.law)).solve(arguments, mass_of(p), guess, descent, limits, out)
     return out
 

@@ -11,6 +11,7 @@ this module loads numba.
 from __future__ import annotations
 
 import functools
+import inspect
 
 import numpy as np
 from numba import njit
@@ -45,6 +46,7 @@ from rft.formulas.simd import (
     add_vector,
     any_of,
     load,
+    of_one_element,
     record_access,
     register_formulas,
     store,
@@ -503,3 +505,40 @@ def chain_kernel(Law: type):
     return cached(
         velocities, f"velocities of chains for laws of the form {Law.__name__}"
     )
+
+
+@functools.cache
+def velocity_kernel():
+    """Return the compiled velocities of elements at a velocity of the frame."""
+    register_formulas()
+    element = of_one_element(Elements, len(Elements._fields))
+
+    @njit(nogil=True, error_model="numpy")
+    def velocities(elements, xi, out):
+        for e in range(out.shape[1]):
+            for i in range(out.shape[2]):
+                straight = element(elements, e, i)
+                v = to_element(straight, xi[0, i], xi[1, i], xi[2, i])
+                out[0, e, i] = straight.v_t + v[0]
+                out[1, e, i] = straight.v_n + v[1]
+                out[2, e, i] = straight.v_w + v[2]
+
+    return cached(velocities, "the velocities of elements")
+
+
+@functools.cache
+def element_kernel(formula):
+    """Return the compiled update of numbers of elements by a formula
+    (`rft.effects.Effect.element_update`)."""
+    register_formulas()
+    new_numbers = of_one_element(formula, len(inspect.signature(formula).parameters))
+
+    @njit(nogil=True, error_model="numpy")
+    def update(arguments, out):
+        for e in range(out.shape[1]):
+            for i in range(out.shape[2]):
+                new = new_numbers(arguments, e, i)
+                for j in range(len(new)):
+                    out[j, e, i] = new[j]
+
+    return cached(update, f"the update of an effect by {formula.__name__}")

@@ -216,3 +216,25 @@ def limits_of(drag: Problem | Assembly, accuracy: Accuracy) -> Limits:
     largest = max(1.0, drag.lateral_drag / drag.axial_drag)
     residual = accuracy.tolerance + 1e-14 * largest
     return Limits(float(accuracy.rounding), float(residual))
+
+
+def from_guess(
+    problem: Problem,
+    scale: np.ndarray,
+    accuracy: Accuracy,
+    assembly: Assembly,
+    guess: np.ndarray,
+    solve_once: Callable,
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return xi, residual and limit as of `Solutions`, as Newton's method finds them
+    from a guess: what `solve` does first, with less work around it, for a small batch.
+
+    solve_once: the function ``solve`` of the driver."""
+    limits = _limits(problem, accuracy)
+    descent = begin(WARM, assembly.linear, limits)
+    with np.errstate(over="ignore"):
+        guess = guess / scale
+    results = solve_once(problem, descent, limits, guess)
+    solved = np.count_nonzero(results[RESIDUAL] <= limits.residual)
+    listener()(solved, assembly.n_law_points, assembly.linear)
+    return results[:3] * scale, results[RESIDUAL], limits.residual

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import functools
 import operator
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar, NamedTuple, Self
 
@@ -43,9 +43,9 @@ class Site(NamedTuple):
     """Place and phase of one time step of B samples, in body lengths and rad.
 
     count: number of steps before this one. dt: phase since the previous step, rad, 0 at
-    the first step. pose: (3, B), predicted pose of the frame on the ground. v_before:
-    velocities (v_t, v_n, v_w) of the body's elements at the previous step, (n, B)
-    each."""
+    the first step. pose: (3, B), predicted pose of the frame on the ground (that at the
+    previous step where no effect reads it). v_before: velocities (v_t, v_n, v_w) of the
+    body's elements at the previous step, (n, B) each."""
 
     count: int
     dt: float
@@ -88,6 +88,8 @@ class Effect:
         sooner; None for a state of another kind.
     memory_size : numbers that time stepping stores for each sample, beside a few for
         each element.
+    reads_place : whether the effect reads `Site.pose`, which is not predicted where no
+        effect does.
     varies_along : whether the effect varies along an element; it then acts by its mean
         over each piece of an element.
     odd : whether the loads that it adds change sign with all velocities (assumed, not
@@ -95,6 +97,11 @@ class Effect:
     metres : fields in body lengths, and for each the field that gives it in metres, of
         a body with a ``length``.
     required : fields without a default that follow one with.
+    element_update : for an effect whose state is numbers of the body's elements
+        (k, n, B), a formula of one element in place of `after` (a function that
+        ``rft.formulas.vectors.formula`` marks, as a staticmethod): its arguments are
+        those of `element_arguments`, then v_t, v_n and v_w after the step, and it
+        returns the k new numbers. It is compiled where balances are.
 
     Examples
     --------
@@ -113,9 +120,11 @@ class Effect:
     drift_tolerance = 1e-6
     memory_bounds: ClassVar[tuple[float, float] | None] = None
     memory_size = 0
+    reads_place = True
     varies_along = odd = False
     metres: ClassVar[Mapping[str, InMetres]] = {}
     required = ()
+    element_update: ClassVar[Callable[..., tuple] | None] = None
 
     def check_lengths(self) -> None:
         """Raise ValueError unless each length is given once, in body lengths or in
@@ -222,7 +231,18 @@ class Effect:
     def after(self, problem: Problem, site: Site, state: Any, v: tuple) -> Any:
         """Return the state after a step that ended with velocities v = (v_t, v_n, v_w)
         of the body's elements."""
-        return state
+        if self.element_update is None:
+            return state
+        return np.array(
+            self.element_update(*self.element_arguments(problem, site, state), *v)
+        )
+
+    def element_arguments(
+        self, problem: Problem, site: Site, state: Any
+    ) -> tuple[np.ndarray, ...]:
+        """Return the first arguments of `element_update`, arrays that broadcast to
+        (n, B)."""
+        raise NotImplementedError
 
     def with_velocity_change(
         self,

@@ -127,6 +127,10 @@ class Problem(NamedTuple):
         # The law, in the first six fields, is the same for all samples.
         return Problem(*self[:6], *take(self[6:], index))
 
+    def split(self, count: int) -> list[Problem]:
+        """Return ``count`` problems with equal numbers of samples in a row."""
+        return [Problem(*self[:6], *rest) for rest in split(self[6:], count)]
+
     def with_points(
         self, points: Contact, terms: Sequence[tuple[float, float, float]]
     ) -> Problem:
@@ -179,6 +183,24 @@ def take(record, index) -> Any:
         return x[..., index]
 
     return mapped(selected, record)
+
+
+def split(record, count: int) -> list:
+    """Return ``count`` records with equal numbers of samples in a row, which they share
+    out of a record; arrays of one column stay as they are."""
+    if isinstance(record, np.ndarray):
+        if record.shape[-1] == 1 and record.ndim > 1:
+            return [record] * count
+        by_part = record.reshape(*record.shape[:-1], count, -1)
+        return list(np.ascontiguousarray(np.moveaxis(by_part, -2, 0)))
+    if not isinstance(record, tuple):
+        return [record] * count
+    parts = [split(field, count) for field in record]
+    if all(part[0] is field for part, field in zip(parts, record)):
+        return [record] * count
+    if hasattr(record, "_fields"):
+        return [type(record)(*fields) for fields in zip(*parts)]
+    return list(zip(*parts))
 
 
 class Assembly(NamedTuple):

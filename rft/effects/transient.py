@@ -3,6 +3,7 @@ travel (paper Sec. IV A)."""
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -12,11 +13,10 @@ from rft.core.checks import Number, check_numbers
 from rft.core.premise import Premise
 from rft.effects.base import EFFECTS, Effect, InMetres, Site
 from rft.effects.contact import Problem
-from rft.formulas.link import developed_direction, find_pivot
+from rft.formulas.link import directions_after
 
 # body lengths, least travel: an element at rest creeps at the regularisation
 SHORTEST = 1e-6
-SIGN = np.array([1.0, -1.0])[:, None, None]  # of v_n towards the left and the right
 # of a direction over the travel: of what is missing after a reversal exp(-3) = 5 % is
 # still missing
 E_FOLDINGS = 3.0
@@ -92,7 +92,9 @@ class Transient(Effect):
     )
     batched = ("travel", "at_once", "ratio", "at_once_along", "travel_m")
     memory_bounds = (-1.0, 1.0)
+    reads_place = False
     varies_along = True
+    element_update = staticmethod(directions_after)
 
     def __post_init__(self):
         check_numbers(self)
@@ -112,55 +114,43 @@ class Transient(Effect):
             across=across,
             v_t_before=v_t_before,
             v_n_before=v_n_before,
-            at_once_along=np.atleast_2d(self.at_once_along),
-            at_once_across=np.atleast_2d(self.at_once),
+            at_once_along=np.array(self.at_once_along, ndmin=2),
+            at_once_across=np.array(self.at_once, ndmin=2),
             step_along=step_along,
             step_across=step_across,
         )
         return problem._replace(memory=memory)
 
-    def after(
-        self, problem: Problem, site: Site, state: np.ndarray, v: np.ndarray
-    ) -> np.ndarray:
-        step_along, step_across = self.steps(site.dt)
-        sign = np.where(v[0] >= 0, 1.0, -1.0)
-        before = sign * site.v_before[0]
-        along, _ = developed_direction(
-            sign * state[0], before, np.abs(v[0]), step_along
-        )
-        along = sign * along
-        parts, left = part_velocities(v[1], v[2])
-        before = SIGN * site.v_before[1]
-        across, _ = developed_direction(
-            SIGN * state[1], before, SIGN * parts, step_across
-        )
-        across = SIGN * across
-        return np.array([along, left * across[0] + (1 - left) * across[1]])
+    def element_arguments(
+        self, problem: Problem, site: Site, state: np.ndarray
+    ) -> tuple[np.ndarray, ...]:
+        return (*state, *site.v_before[:2], *self.steps(site.dt))
 
     def steps(self, dt: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the e-foldings of the directions along and across over a step (1, B)
         at unit speed; inf without travel, and at the first step: a body begins as if it
         had always moved as it does then."""
-        travel = np.atleast_2d(self.travel)
-
-        def e_foldings(x):
-            count = E_FOLDINGS * dt / np.maximum(x, SHORTEST)
-            return np.where((x > 0) & (dt > 0), count, np.inf)
-
-        return e_foldings(self.ratio * travel), e_foldings(travel)
+        return e_foldings(self.ratio * self.travel, dt), e_foldings(self.travel, dt)
 
     @classmethod
     def examples(cls, x: float = 0.3) -> dict[str, Transient]:
         return {"transient": cls(travel=2 * x)}
 
 
-def part_velocities(v_n: np.ndarray, v_w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mean velocities v_n (2, n, B) of the parts of elements that move left
-    and right, 0 where a part is empty, and the left part's fraction of the length
-    (n, B)."""
-    _, inside, _ = find_pivot(v_n, v_w)
-    difference = np.abs(v_w)  # of v_n, between centre and end
-    left = np.where(inside, (v_n + difference) / 2, np.maximum(v_n, 0.0))
-    right = np.where(inside, (v_n - difference) / 2, np.minimum(v_n, 0.0))
-    fraction = (1 + v_n / np.where(inside, difference, 1.0)) / 2
-    return np.array([left, right]), np.where(inside, fraction, v_n > 0)
+def e_foldings(travel: float | np.ndarray, dt: float) -> np.ndarray:
+    """Return the e-foldings (1, B) of a mean direction over a step at unit speed; inf
+    without travel or step."""
+    if isinstance(travel, float):
+        return _e_foldings_of_one(travel, dt)
+    return _e_foldings(np.atleast_2d(travel), dt)
+
+
+def _e_foldings(travel: np.ndarray, dt: float) -> np.ndarray:
+    count = E_FOLDINGS * dt / np.maximum(travel, SHORTEST)
+    return np.where((travel > 0) & (dt > 0), count, np.inf)
+
+
+@functools.lru_cache
+def _e_foldings_of_one(travel: float, dt: float) -> np.ndarray:
+    # The same at every step, and as long to compute as all elements' directions.
+    return _e_foldings(np.array([[travel]]), dt)

@@ -29,6 +29,7 @@ import numpy as np
 
 from rft.formulas.vectors import (
     absolute,
+    anywhere,
     copysign,
     exp,
     formula,
@@ -380,12 +381,47 @@ def developed_share(direction, before, now, at_once, step):
 
 
 @formula
-def share_across(sign, intact, v_n, v_w, memory):
-    """Return the share of the drag across on the part of an element that moves left
-    (sign 1) or right (sign -1), and its slopes in v_n and v_w."""
+def part_speed(sign, v_n, v_w, inside):
+    """Return the mean speed across of the part of an element that moves left (sign 1)
+    or right (sign -1), 0 where there is none; inside: as in `find_pivot`."""
+    return where(inside, 0.5 * (sign * v_n + absolute(v_w)), maximum(sign * v_n, 0.0))
+
+
+@formula
+def directions_after(
+    along, across, v_t_before, v_n_before, step_along, step_across, v_t, v_n, v_w
+):
+    """Return the mean directions of an element's travel, along and across, after a step
+    that ends with velocities (v_t, v_n, v_w).
+
+    Other arguments as in `Memory`. The direction across is the mean of those of the
+    parts that move left and right."""
+    sign = where(v_t >= 0.0, 1.0, -1.0)
+    forward, _ = developed_direction(
+        sign * along, sign * v_t_before, absolute(v_t), step_along
+    )
     _, inside, _ = find_pivot(v_n, v_w)
-    # Mean velocity of the part.
-    now = where(inside, 0.5 * (sign * v_n + absolute(v_w)), maximum(sign * v_n, 0.0))
+    left, _ = developed_direction(
+        across, v_n_before, part_speed(1.0, v_n, v_w, inside), step_across
+    )
+    right, _ = developed_direction(
+        -across, -v_n_before, part_speed(-1.0, v_n, v_w, inside), step_across
+    )
+    # The left part's fraction of the length.
+    fraction = where(
+        inside,
+        0.5 * (1.0 + v_n / where(inside, absolute(v_w), 1.0)),
+        where(v_n > 0.0, 1.0, 0.0),
+    )
+    return sign * forward, fraction * left - (1.0 - fraction) * right
+
+
+@formula
+def share_across(sign, intact, v_n, v_w, inside, memory):
+    """Return the share of the drag across on the part of an element that moves left
+    (sign 1) or right (sign -1), and its slopes in v_n and v_w; inside: as in
+    `find_pivot`."""
+    now = part_speed(sign, v_n, v_w, inside)
     direction = sign * memory.across
     before = sign * memory.v_n_before
     value, slope = developed_share(
@@ -415,16 +451,6 @@ def with_share_along(load, v_t, memory):
 
 
 @formula
-def select_triple(condition, x, y):
-    """Return the triple x where the condition holds, y elsewhere."""
-    return (
-        where(condition, x[0], y[0]),
-        where(condition, x[1], y[1]),
-        where(condition, x[2], y[2]),
-    )
-
-
-@formula
 def part_load(law, v_t, v_n, v_w, rounding, low, high, share):
     """Return the load of the part of an element from s = low to high, with a share of
     the drag across, given as (value, slope in v_n, slope in v_w)."""
@@ -451,17 +477,18 @@ def two_sided_load(law, v_t, v_n, v_w, rounding, memory):
 
     The drag across vanishes at the pivot, so that its motion does not contribute to the
     slopes."""
-    pivot, _, u_head = find_pivot(v_n, v_w)
-    left = share_across(1.0, memory.intact_left, v_n, v_w, memory)
-    right = share_across(-1.0, memory.intact_right, v_n, v_w, memory)
+    pivot, inside, u_head = find_pivot(v_n, v_w)
     leftward = u_head > 0.0
-    head = part_load(
-        law, v_t, v_n, v_w, rounding, pivot, 1.0, select_triple(leftward, left, right)
-    )
-    tail = part_load(
-        law, v_t, v_n, v_w, rounding, -1.0, pivot, select_triple(leftward, right, left)
-    )
-    return with_share_along(sum_loads(head, tail), v_t, memory)
+    left, right = memory.intact_left, memory.intact_right
+    sign = where(leftward, 1.0, -1.0)
+    share = share_across(sign, where(leftward, left, right), v_n, v_w, inside, memory)
+    load = part_load(law, v_t, v_n, v_w, rounding, pivot, 1.0, share)
+    if anywhere(inside):  # else nothing lies on the tail's side
+        intact = where(leftward, right, left)
+        share = share_across(-sign, intact, v_n, v_w, inside, memory)
+        tail = part_load(law, v_t, v_n, v_w, rounding, -1.0, pivot, share)
+        load = sum_loads(load, tail)
+    return with_share_along(load, v_t, memory)
 
 
 @formula

@@ -8,6 +8,7 @@ which takes some 0.2 s."""
 
 from __future__ import annotations
 
+import math
 import operator
 
 import numpy as np
@@ -209,7 +210,6 @@ def _define(function, takes, emit, number):
 
 _define(vectors.sqrt, (vector,), _intrinsic("sqrt", 1), lambda x: np.sqrt(x))
 _define(vectors.absolute, (vector,), _intrinsic("fabs", 1), lambda x: abs(x))
-_define(vectors.exp, (vector,), _intrinsic("exp", 1), lambda x: np.exp(x))
 _define(vectors.floor, (vector,), _intrinsic("floor", 1), lambda x: np.floor(x))
 _define(
     vectors.copysign,
@@ -279,6 +279,49 @@ def _log_ratio(a, b):
         return LN2 * power + (s + s) * (1.0 + z * vectors.polynomial(z, ATANH))
 
     return log_ratio
+
+
+@intrinsic
+def _times_power_of_two(context, x, shifted):
+    """Return x 2^k for eight integers k between -1022 and 1023, given as ROUND + k."""
+
+    def emit(context, builder, sig, args):
+        power = builder.shl(
+            builder.bitcast(args[1], INTEGERS), ir.Constant(INTEGERS, [52] * WIDTH)
+        )
+        bits = builder.add(builder.bitcast(args[0], INTEGERS), power)
+        return builder.bitcast(bits, DOUBLES)
+
+    return vector(x, shifted), emit
+
+
+# ln 2 in two parts, of which the first has so few digits that k times it is exact.
+LN2_HIGH = float.fromhex("0x1.62e42fefap-1")
+LN2_LOW = float.fromhex("0x1.cf79abc9e3b3ap-40")
+# Of numbers this large the last binary digit is 1, so that adding it rounds.
+ROUND = 1.5 * 2.0**52
+LEAST_EXPONENT = -708.0  # below which the exponential function is taken as 0
+LARGEST_EXPONENT = 709.0
+# Coefficients of exp r to roundoff for |r| < ln 2 / 2.
+EXP = tuple(1.0 / math.factorial(j) for j in range(14))
+
+
+@overload(vectors.exp, inline="never", jit_options={"forceinline": True})
+def _exp(x):
+    if isinstance(x, types.Number):
+        return lambda x: np.exp(x)
+
+    def exp(x):
+        inside = vectors.where(x < LEAST_EXPONENT, LEAST_EXPONENT, x)
+        inside = vectors.where(x > LARGEST_EXPONENT, LARGEST_EXPONENT, inside)
+        shifted = inside * (1.0 / LN2) + ROUND
+        k = shifted - ROUND
+        r = (inside - k * LN2_HIGH) - k * LN2_LOW
+        power = _times_power_of_two(vectors.polynomial(r, EXP), shifted)
+        power = vectors.where(x < LEAST_EXPONENT, 0.0, power)
+        return vectors.where(x > LARGEST_EXPONENT, np.inf, power)
+
+    return exp
 
 
 @overload(vectors.polynomial, inline="never", jit_options={"forceinline": True})
@@ -418,6 +461,13 @@ def any_of(context, x):
     return types.boolean(x), emit
 
 
+@overload(vectors.anywhere)
+def _anywhere(condition):
+    if condition == mask:
+        return lambda condition: any_of(condition)
+    return lambda condition: condition
+
+
 @intrinsic
 def _gather(context, table, row, column):
     """Return table[row, column] of an array (n, m) for a vector of eight integers
@@ -463,6 +513,24 @@ def record_access(kind):
     return register_jitable(forceinline=True)(read), register_jitable(forceinline=True)(
         write
     )
+
+
+def of_one_element(formula, count: int):
+    """Return f(arguments, e, i), a formula of the entries (e, i) of ``count`` arrays
+    (n, B), of which a single row or column stands for all."""
+    entries = ", ".join(f"entry(arguments[{j}], e, i)" for j in range(count))
+    function = _function_from_source(
+        "of_one_element",
+        ["arguments, e, i", f"    return formula({entries})"],
+        formula=formula,
+        entry=_entry,
+    )
+    return register_jitable(forceinline=True)(function)
+
+
+@register_jitable(forceinline=True)
+def _entry(x, e, i):
+    return x[min(e, x.shape[0] - 1), min(i, x.shape[1] - 1)]
 
 
 @overload(vectors.over_nodes, inline="never")

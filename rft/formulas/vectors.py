@@ -100,6 +100,12 @@ def gather(table, row, column):
     return table[np.asarray(row, int), column]
 
 
+def anywhere(condition):
+    """Return whether a condition holds for any of the numbers that are computed
+    together, so that what concerns no other may be left out."""
+    return np.any(condition)
+
+
 def over_nodes(load):
     """Return a load summed over the nodes of a rule, the first axis of arrays; compiled
     code takes one node at a time."""

@@ -14,23 +14,32 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rft.balance import arrays
 from rft.balance.arrays import frame_net, velocities, with_frame_velocity
-from rft.balance.backend import check
-from rft.balance.solver import Accuracy, Solutions, solve
+from rft.balance.backend import check, solves_compiled, updates_compiled
+from rft.balance.solver import (
+    ELEMENTS_TOGETHER,
+    Accuracy,
+    Solutions,
+    compiled_driver,
+    from_guess,
+    solve,
+)
 from rft.balance.velocity import checked_input
-from rft.bodies.base import Body, body_size, half_lengths, joint_speed
+from rft.bodies.base import Body, Elements, body_size, half_lengths, joint_speed
 from rft.bodies.pieces import PIECES
 from rft.core.checks import in_range
 from rft.core.premise import Premise
 from rft.core.refusal import require
 from rft.effects.base import PAST, Effect, Site, broken_premises, stepwise_effects
 from rft.effects.contact import Assembly, Problem, assemble
+from rft.formulas.link import TINY
 from rft.formulas.newton import to_element
 from rft.laws.base import Medium
 from rft.motion import limit_cycle
@@ -239,7 +248,7 @@ def _cycles(
     for cycle in itertools.count(1):
         start = stepping.memory(state)
         state, rows = advance(stepping, state, stepping.phases, with_work)
-        pose = np.stack([*(row.pose for row in rows), stepping.site(state).pose])
+        pose = np.stack([*(row.pose for row in rows), stepping.next_pose(state)])
         if with_path:
             path.append(pose[:-1])
         if mixes and cycle > 1:  # before the first step there is no memory
@@ -284,10 +293,13 @@ def _relative_pose(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def _integrated(pose: np.ndarray, xi: np.ndarray, dt: float) -> np.ndarray:
     """Return the pose (3, B) reached from a pose at a constant body velocity xi (3, B)
     after dt."""
-    half = 0.5 * dt * xi[2]
-    direction = np.exp(1j * (pose[2] + half))
-    z = dt * np.sinc(half / np.pi) * direction * (xi[0] + 1j * xi[1])
-    return pose + np.array([z.real, z.imag, dt * xi[2]])
+    moved = dt * xi
+    half = 0.5 * moved[2]
+    chord = np.sin(half + TINY) / (half + TINY)  # over the arc
+    z = chord * np.exp(1j * (pose[2] + half)) * (moved[0] + 1j * moved[1])
+    moved[0] = z.real
+    moved[1] = z.imag
+    return pose + moved
 
 
 def _with_batch_axes(steps: TimeSteps, batch: tuple, length: float) -> TimeSteps:
@@ -367,11 +379,22 @@ class Stepping:
         self.alphadot = alphadot
         self.accuracy = accuracy
         self.backend = backend
+        size = assembly.n_law_points * alpha.shape[0] * alpha.shape[-1]
+        self._stores_problems = size <= MOST_STORED
+        self._is_small = assembly.n_law_points * alpha.shape[-1] <= ELEMENTS_TOGETHER
+        self._known: dict[int, Any] = {}  # what the compiled driver knows by phase
+        self.is_compiled = solves_compiled(backend, assembly.law)
         self.to_limit = to_limit
         self.body_halves = body_halves
         self.phases = len(alpha)
         self.dt = 2 * np.pi / self.phases
         self.heavy = bool(broken_premises(self.effects) & Premise.QUASI_STATIC)
+        # Memory and mass have no effect at the first step.
+        self.first_effects = [not effect.breaks & PAST for effect in self.effects]
+        self.reads_place = any(effect.reads_place for effect in self.effects)
+        self.compiled_updates = [
+            updates_compiled(backend, effect, assembly.law) for effect in self.effects
+        ]
         self.drift_tolerance = max(
             [1e-6, *(e.drift_tolerance for e in assembly.effects)]
         )
@@ -379,9 +402,8 @@ class Stepping:
     @cached_property
     def scales(self) -> np.ndarray:
         """Scales of speed at all phases, (N, B)."""
-        speed = np.stack(
-            [joint_speed(self.assembly.body, rates) for rates in self.alphadot]
-        )
+        rates = _phase_after_phase(self.alphadot)
+        speed = joint_speed(self.assembly.body, rates).reshape(self.phases, -1)
         rms = np.sqrt((speed**2).mean(0))
         rms = np.where(rms > 0, rms, 1.0)
         if self.heavy:  # a heavy body moves while its joints pause
@@ -390,18 +412,22 @@ class Stepping:
 
     @cached_property
     def _stored_problems(self) -> list[Problem]:
-        return [self._problem(k) for k in range(self.phases)]
-
-    def _problem(self, k: int) -> Problem:
-        return self.assembly.problem(self.alpha[k], self.alphadot[k], self.scales[k])
+        # As one batch, for many small ones take longer.
+        samples = np.arange(self.alpha.shape[-1])
+        assembly = self.assembly.take(np.tile(samples, self.phases))
+        problem = assembly.problem(
+            _phase_after_phase(self.alpha),
+            _phase_after_phase(self.alphadot),
+            self.scales.ravel(),
+        )
+        return problem.split(self.phases)
 
     def problem(self, k: int) -> Problem:
         """Return the balance at the phase 2 pi k / N, without effects that depend on
         the past or the place."""
-        size = self.assembly.n_law_points * self.phases * self.alpha.shape[-1]
-        if size <= MOST_STORED:
+        if self._stores_problems:
             return self._stored_problems[k]
-        return self._problem(k)
+        return self.assembly.problem(self.alpha[k], self.alphadot[k], self.scales[k])
 
     def guess(self, s: State) -> np.ndarray:
         """Return a guess of the velocity (3, B) at the next step, by linear
@@ -410,12 +436,18 @@ class Stepping:
             return 2 * s.xi - s.xi_before
         return s.xi
 
-    def site(self, s: State) -> Site:
-        """Return the predicted site of the next step."""
+    def site(self, s: State, guess: np.ndarray) -> Site:
+        """Return the site of the next step, predicted by a guess of its velocity."""
         count = int(s.count[0, 0])
         dt = self.dt if count else 0.0
-        pose = _integrated(s.pose, (s.xi + self.guess(s)) / 2, dt)
+        pose = s.pose
+        if self.reads_place:
+            pose = _integrated(pose, (s.xi + guess) / 2, dt)
         return Site(count, dt, pose, s.v)
+
+    def next_pose(self, s: State) -> np.ndarray:
+        """Return the predicted pose (3, B) at the next step."""
+        return _integrated(s.pose, (s.xi + self.guess(s)) / 2, self.dt)
 
     def begin(self) -> State:
         """Return the state before the first step, on undisturbed ground."""
@@ -435,28 +467,28 @@ class Stepping:
 
     def step(self, s: State, with_work: bool = False) -> tuple[State, Row]:
         """Return the state after the next step, and its row."""
-        site = self.site(s)
-        first = s.count[0, 0] == 0
+        guess = self.guess(s)
+        site = self.site(s, guess)
+        first = site.count == 0
         k = site.count % self.phases
         undisturbed = self.problem(k)
         problem = undisturbed
-        for effect, state in zip(self.effects, s.effect_states):
-            # Memory and mass have no effect at the first step.
-            if not first or not effect.breaks & PAST:
+        for effect, state, acts in zip(
+            self.effects, s.effect_states, self.first_effects
+        ):
+            if acts or not first:
                 problem = effect.apply(problem, site, state)
 
-        guess = None
-        if not first:
-            guess = self.guess(s)
-        solved = self._solved(problem, self.scales[k], guess)
-        xi = solved.xi
+        xi, residual, limit = self._solved(k, problem, None if first else guess)
         pose = s.pose
         if not first:
             pose = _integrated(pose, (s.xi + xi) / 2, self.dt)
-        v = _velocities(problem, xi)
+        v = self._velocities(problem.sides.elements, xi)
         states = tuple(
-            e.after(problem, site, state, v)
-            for e, state in zip(self.effects, s.effect_states)
+            self._state_after(e, is_compiled, problem, site, state, v)
+            for e, is_compiled, state in zip(
+                self.effects, self.compiled_updates, s.effect_states
+            )
         )
         work = None
         if with_work:
@@ -470,24 +502,91 @@ class Stepping:
         after = State(s.count + 1, pose, xi, s.xi, v, states, cycles)
         if k == self.phases - 1:
             after = self._after_cycle(after, undisturbed, site)
-        return after, Row(xi, pose, solved.residual, np.array([solved.limit]), work)
+        return after, Row(xi, pose, residual, np.array([limit]), work)
 
     def _solved(
-        self, problem: Problem, scale: np.ndarray, guess: np.ndarray | None
+        self, k: int, problem: Problem, guess: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray, float]:
+        """Return body velocities, residuals and the largest residual of a solution, of
+        a balance at the phase 2 pi k / N."""
+        scale = self.scales[k]
+        if guess is None or not self._is_small:
+            found = self._solve_all(problem, scale, np.arange(scale.size), guess)
+            return found.xi, found.residual, found.limit
+        xi, residual, limit = from_guess(
+            problem, scale, self.accuracy, self.assembly, guess, self._solve_once(k)
+        )
+        rest = np.flatnonzero(~(residual <= limit))
+        if rest.size:
+            found = self._solve_all(problem, scale, rest)
+            xi[:, rest] = found.xi
+            residual[rest] = found.residual
+            limit = max(limit, found.limit)
+        return xi, residual, limit
+
+    def _solve_all(
+        self,
+        problem: Problem,
+        scale: np.ndarray,
+        samples: np.ndarray,
+        guess: np.ndarray | None = None,
     ) -> Solutions:
+        """Return the solutions of some samples of a problem."""
+
         def problem_at(index):
             if index.size == scale.size:
                 return problem
-            return problem.take(index)
+            return problem.take(samples[index])
 
         return solve(
-            problem_at, scale, self.accuracy, self.assembly, self.backend, 1, guess
+            problem_at,
+            scale[samples],
+            self.accuracy,
+            self.assembly,
+            self.backend,
+            1,
+            guess,
+        )
+
+    def _solve_once(self, k: int) -> Callable:
+        """Return the solver of one descent for balances at the phase 2 pi k / N."""
+        if not self.is_compiled:
+            return arrays.solve
+        driver = compiled_driver()
+        if not self._stores_problems:
+            return driver.solve
+        if k not in self._known:
+            self._known[k] = driver.known_arguments(self._stored_problems[k])
+        return partial(driver.solve, known=self._known[k])
+
+    def _velocities(self, e: Elements, xi: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return the velocities (v_t, v_n, v_w) of elements, (n, B) each, at a body
+        velocity xi (3, B)."""
+        if self.is_compiled:
+            return compiled_driver().element_velocities(e, xi)
+        return tuple(a + b for a, b in zip((e.v_t, e.v_n, e.v_w), to_element(e, *xi)))
+
+    def _state_after(
+        self,
+        effect: Effect,
+        is_compiled: bool,
+        problem: Problem,
+        site: Site,
+        state: Any,
+        v: tuple,
+    ) -> Any:
+        """Return `Effect.after`, by compiled code where that is asked for."""
+        if not is_compiled:
+            return effect.after(problem, site, state, v)
+        arguments = effect.element_arguments(problem, site, state)
+        return compiled_driver().element_update(
+            effect.element_update, (*arguments, *v), state.shape
         )
 
     def _after_cycle(self, s: State, problem: Problem, site: Site) -> State:
         """Return the state at the end of a cycle with a new record of cycles,
         extrapolated if cycles are to repeat."""
-        displacement = _relative_pose(s.cycles.pose, self.site(s).pose)
+        displacement = _relative_pose(s.cycles.pose, self.next_pose(s))
         if not self.heavy:
             cycles = limit_cycle.after_massless_cycle(s.cycles, displacement)
             return s._replace(cycles=cycles)
@@ -552,8 +651,6 @@ class Stepping:
         return np.stack(frame_net(problem, v, rounding, *scaled).force)
 
 
-def _velocities(problem: Problem, xi: np.ndarray) -> tuple:
-    """Return the velocities (v_t, v_n, v_w) of the body's elements, (n, B) each, at a
-    body velocity xi (3, B)."""
-    e = problem.sides.elements
-    return tuple(a + b for a, b in zip((e.v_t, e.v_n, e.v_w), to_element(e, *xi)))
+def _phase_after_phase(x: np.ndarray) -> np.ndarray:
+    """Return values (N, joints, B) as those of N B samples, (joints, N B)."""
+    return np.moveaxis(x, 0, 1).reshape(x.shape[1], -1)

@@ -298,6 +298,101 @@ class Softening(Effect):
         return 0.5 * past + site.dt * np.hypot(v[0], v[1])
 
 
+@formula
+def softened(past, dt, v_t, v_n, v_w):
+    """`Softening.after`, of one element."""
+    return (0.5 * past + dt * sqrt(v_t * v_t + v_n * v_n),)
+
+
+class ByElement(Softening):
+    """`Softening` with its `after` as a formula of one element."""
+
+    kind = "softening by element"
+    element_update = staticmethod(softened)
+
+    def begin(self, problem, site):
+        return super().begin(problem, site)[None]
+
+    def apply(self, problem, site, past):
+        return super().apply(problem, site, past[0])
+
+    def element_arguments(self, problem, site, past):
+        return past[0], np.full((1, 1), site.dt)
+
+    after = Effect.after
+
+
+class ByHand(ByElement):
+    """An `after` of its own, which goes before the formula that it has from another."""
+
+    def after(self, problem, site, past, v):
+        return Softening.after(self, problem, site, past, 2.0 * np.array(v))
+
+
+def states(effects, how):
+    """Numbers of the states after each of the first steps, one after the other."""
+    found = []
+
+    def numbers(x):
+        if isinstance(x, np.ndarray):
+            return x.ravel()
+        return np.concatenate([np.zeros(0), *map(numbers, x)])
+
+    def advance(stepping, state, count, with_work):
+        rows = []
+        for _ in range(count):
+            state, row = stepping.step(state, with_work)
+            rows.append(row)
+            found.append(numbers([*state.v, *state.effect_states]))
+        return state, rows
+
+    cycle = GAIT.cycle(8, np.array([0.4, 1.0]))
+    options = {"effects": sized(effects), "cycles": 1, "backend": how}
+    time_steps(GLASS, BODY, *cycle, advance=advance, **options)
+    return np.stack(found)
+
+
+OWN = {"by element": ByElement(0.1), "by hand": ByHand(0.1)}
+
+
+@compiled
+@pytest.mark.parametrize("name", [*EFFECTS, *OWN])
+def test_the_same_states(name):
+    """Velocities of elements and states of effects at every step, whether an effect's
+    update is compiled or not."""
+    effect = OWN[name] if name in OWN else EFFECTS[name][0](0.2)
+    plain, fast = (states([effect], how) for how in BOTH)
+    np.testing.assert_allclose(fast, plain, rtol=1e-11, atol=1e-11)
+    if name == "by element":
+        np.testing.assert_allclose(plain, states([Softening(0.1)], "numpy"))
+    if name == "by hand":
+        assert np.abs(fast - states([ByElement(0.1)], "numba")).max() > 1e-3
+
+
+@compiled
+def test_eight_exponential_functions():
+    from numba import njit
+
+    from rft.formulas import simd, vectors
+
+    load, store, exp = simd.load, simd.store, vectors.exp
+
+    @njit
+    def compute(x, out):
+        for k in range(len(x)):
+            store(out, k, exp(load(x, k)))
+
+    rng = np.random.default_rng(5)
+    x = np.concatenate([
+        [0.0, -1e-300, -707.9, 708.9, -np.inf, np.inf, np.nan, -1e4],
+        -(10.0 ** rng.uniform(-20, 2.8, 800)),
+        rng.uniform(-700, 700, 800),
+    ]).reshape(-1, 8)  # fmt: skip
+    found = np.empty_like(x)
+    compute(x, found)
+    np.testing.assert_allclose(found, np.exp(x), rtol=3e-16, atol=0)
+
+
 class Turtle:
     """A body of one's own: a trunk of 0.6 with two flippers of 0.2 at its head, whose
     angles to the trunk are the joints."""

@@ -8,6 +8,7 @@ import resource
 import subprocess
 import sys
 import time
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -31,8 +32,10 @@ from rft import (
     body_velocity,
     time_steps,
 )
+from rft.balance import solver
 from rft.balance.backend import preferring
 from rft.balance.solver import QUICK
+from rft.laws.records import Terms
 
 pytestmark = [
     pytest.mark.benchmark,
@@ -222,6 +225,36 @@ def test_a_march_of_a_hundred_elements():
             f"{1e3 * seconds / 64:.2f} ms a step, ratio {took['numpy'] / seconds:.1f}"
         )
         print(f"\n100 elements, transient, {NAMES[how]}: {told}", end="")
+
+
+def test_steps_over_the_kernel():
+    """The cycle of the scene with a transient, over what its balances take in the
+    kernel alone: where this is large, time is lost around it."""
+    if "numba" not in backends():
+        pytest.skip("numba is not installed")
+    scene = load("sandfish-transient")
+    cycle = scene.gait.cycle(64)
+    solve = solver.compiled_driver().kernels_of(Terms).solve
+    calls = []
+
+    def kept(*arguments):
+        calls.append(arguments)
+        return solve(*arguments)
+
+    def kernel():
+        for arguments in calls:
+            solve(*arguments)
+
+    kernels = mock.Mock(solve=kept)
+    with preferring("numba"):
+        with mock.patch("rft.balance.compiled.kernels_of", return_value=kernels):
+            scene.system.run(*cycle)
+        steps = functools.partial(scene.system.run, *cycle)
+        took = in_turn({"steps": steps, "kernel": kernel}, 15)
+    ratio = took["steps"] / took["kernel"]
+    each = 1e6 * took["steps"] / len(calls)
+    print(f"\n{len(calls)} steps, {each:.0f} us each, over the kernel {ratio:.1f}")
+    assert ratio < 8
 
 
 @pytest.mark.parametrize("how", backends())
