@@ -1,7 +1,7 @@
-"""The same balance of forces by programs that know nothing of this package: a loop of
-SciPy's fsolve over midpoints, and a plain loop, compiled by numba, with the exact
-integrals. Both are of the three-link swimmer in dry grains (Eqs. 2-3), in the frame of
-the middle link."""
+"""The same balance of forces by programs that know nothing of this package: loops of
+SciPy's fsolve and least_squares over midpoints, and a plain loop, compiled by numba,
+with the exact integrals. All are of the three-link swimmer in dry grains (Eqs. 2-3), in
+the frame of the middle link."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import functools
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import fsolve
+from scipy.optimize import fsolve, least_squares
 
 C = 1.8
 GAMMA0 = np.radians(13.8)
@@ -26,6 +26,18 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
 def one_scipy_solve(alpha, alphadot, elements=20):
     """Return one balance solved in the plainest way: midpoint elements in the middle
     link's frame, Eqs. 2-3 as printed, fsolve."""
+    return fsolve(
+        force_on_midpoints(alpha, alphadot, elements), START, full_output=True
+    )
+
+
+def one_least_squares(alpha, alphadot, elements=20):
+    """Return the same balance by least_squares, as it is without options."""
+    return least_squares(force_on_midpoints(alpha, alphadot, elements), START)
+
+
+def force_on_midpoints(alpha, alphadot, elements):
+    """Return the function of a velocity (3,) that gives force and moment."""
     s = ((np.arange(elements) + 0.5) / elements * 2 - 1) * HALF
     headings = np.array([-alpha[0], 0.0, alpha[1]])
     turns = np.array([-alphadot[0], 0.0, alphadot[1]])
@@ -46,7 +58,7 @@ def one_scipy_solve(alpha, alphadot, elements=20):
         moment = place[..., 0] * f[..., 1] - place[..., 1] * f[..., 0]
         return [f[..., 0].sum(), f[..., 1].sum(), moment.sum()]
 
-    return fsolve(force, START, full_output=True)
+    return force
 
 
 def by_fsolve(alpha: np.ndarray, alphadot: np.ndarray) -> np.ndarray:

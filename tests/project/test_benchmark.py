@@ -14,6 +14,7 @@ import pytest
 from quadruped import STANCE, quadruped
 
 from figures import peers
+from figures.accuracy import others
 from figures.accuracy.cost_scaling import NAMES, backends, shortest_time
 from geomech.mathematics.gaits import Butterfly, Circle, Sine
 from geomech.mathematics.geometry import connection
@@ -121,6 +122,18 @@ def test_against_a_loop_of_fsolve():
     print(f"  the loop says that it fails in {failed:.0%}", end=", ")
     print(f"is off by more than 0.01 in {np.mean(off > 0.01):.0%}")
     assert (solution.status != "unconverged").all()
+
+
+def test_against_programs_of_others():
+    """The rows of `python -m figures.accuracy.others`, of programs that are at hand."""
+    rows, steps = others.compute()
+    for row in rows:
+        print(f"\n{row}", end="")
+        assert row.theirs > 3 * row.ours[backends()[-1]]
+    for name, took in steps.items():
+        share = 1 - steps["nothing"] / took
+        print(f"\na step of MuJoCo, {name}: {1e6 * took:.0f} us, {share:.0%}", end="")
+        assert took >= steps["nothing"]
 
 
 @pytest.mark.parametrize("gait", [Circle(), Butterfly()])
