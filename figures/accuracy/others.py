@@ -43,7 +43,7 @@ SHORTEST = 0.1  # CPU seconds that a turn of short calls takes
 GLASS = Granular(peers.C, peers.GAMMA0)
 THREE_LINKS = Chain(frame="link-2")
 WORM_PERIOD = 1.6  # s, of ElegansBot's example of a worm on agar
-WORM_SETTLES = 9  # cycles until its shapes repeat to 1e-5 rad
+WORM_SETTLES = 9  # cycles until its shapes repeat to 1e-6 rad
 WORM_PHASES = 1600  # times in a cycle at which its muscles are told what to do
 PHASES = 32  # of our balance in a cycle of the worm
 
