@@ -123,6 +123,7 @@ def test_against_a_loop_of_fsolve():
     assert (solution.status != "unconverged").all()
 
 
+@pytest.mark.timeout(1800)
 def test_against_programs_of_others():
     """The rows of `python -m figures.accuracy.others`, of programs that are at hand."""
     rows, steps = others.compute()
