@@ -47,7 +47,7 @@ TIERS = {
 def compute(
     phases: tuple[int, ...] = PHASES,
     starts: int = 12,
-    runs: int = 5,
+    runs: int = 12,
     tiers: bool = True,
 ) -> dict:
     """Return errors (body lengths, rms over amplitudes) and CPU seconds.
@@ -55,7 +55,8 @@ def compute(
     direct: {back end: {"phases", "error" (P, starts), "seconds" (P,)}}. estimated:
     {back end: {"phases", "seconds"}}, with the error estimate. peers: {name: as of
     direct}. tiers: {back end: {label: {"value", "error", "seconds"}}}. Times are the
-    shortest of ``runs``; those of starts other than the first are not taken."""
+    shortest of ``runs``, in which all but the tiers take turns; those of starts other
+    than the first are not taken."""
     scene = load(SCENE)
     scene = scene.changed(medium=Granular(peers.C, peers.GAMMA0))
     amplitudes = scene.gait.amplitude * AMPLITUDE_FRACTIONS
@@ -65,9 +66,9 @@ def compute(
     for name in backends():
         with preferring(name):
             found["direct"][name] = by_direct_tier(
-                scene, amplitudes, truth, phases, starts, runs
+                name, scene, amplitudes, truth, phases, starts
             )
-            found["estimated"][name] = with_estimates(scene, amplitudes, phases, runs)
+            found["estimated"][name] = with_estimates(name, scene, amplitudes, phases)
             if tiers:
                 found["tiers"][name] = by_tiers(scene, runs)
     for name, (solve, counts) in PEERS.items():
@@ -75,9 +76,9 @@ def compute(
             continue
         solve = solve or peers.plain_loop()
         counts = [n for n in counts if n in phases]
-        found["peers"][name] = by_peer(
-            solve, scene, amplitudes, truth, counts, starts, runs
-        )
+        found["peers"][name] = by_peer(solve, scene, amplitudes, truth, counts, starts)
+    rows = [*found["direct"].values(), *found["estimated"].values()]
+    time_in_turn([*rows, *found["peers"].values()], runs)
     return found
 
 
@@ -97,14 +98,27 @@ class Truth:
         return float(np.sqrt(np.mean(estimate.distance(net, self.net(first)) ** 2)))
 
 
-def quickest(compute: Callable, runs: int) -> float:
-    """Return the CPU seconds of the quickest of several runs."""
-    seconds = []
+def time_in_turn(rows: list[dict], runs: int) -> None:
+    """Replace the "calls" of each row by "seconds": CPU seconds of the quickest of
+    several runs, in which all calls take turns, so that all meet the same moods of the
+    machine."""
+    for row in rows:
+        row["seconds"] = [np.inf] * len(row["calls"])
     for _ in range(runs):
-        start = time.process_time()
-        compute()
-        seconds.append(time.process_time() - start)
-    return min(seconds)
+        for row in rows:
+            for k, call in enumerate(row["calls"]):
+                start = time.process_time()
+                call()
+                took = time.process_time() - start
+                row["seconds"][k] = min(row["seconds"][k], took)
+    for row in rows:
+        del row["calls"]
+
+
+def by_backend(name: str, call: Callable):
+    """Return the result of a call by a back end."""
+    with preferring(name):
+        return call()
 
 
 def first_phases(count: int, starts: int) -> list[int]:
@@ -113,10 +127,10 @@ def first_phases(count: int, starts: int) -> list[int]:
     return [FINE * k // (count * starts) for k in range(starts)]
 
 
-def by_direct_tier(scene, amplitudes, truth, phases, starts, runs) -> dict:
-    """Return errors and seconds of the direct tier."""
+def by_direct_tier(name, scene, amplitudes, truth, phases, starts) -> dict:
+    """Return errors and calls of the direct tier by a back end."""
     errors = []
-    seconds = []
+    calls = []
     for count in phases:
         one = scene.with_numerics(phases=count)
         row = []
@@ -129,20 +143,20 @@ def by_direct_tier(scene, amplitudes, truth, phases, starts, runs) -> dict:
         def answer(one=one):
             return SceneTables(one).poses("direct", None, amplitudes)
 
-        seconds.append(quickest(answer, runs))
-    return {"phases": list(phases), "error": errors, "seconds": seconds}
+        calls.append(functools.partial(by_backend, name, answer))
+    return {"phases": list(phases), "error": errors, "calls": calls}
 
 
-def with_estimates(scene, amplitudes, phases, runs) -> dict:
-    """Return seconds of the direct tier with its error estimate."""
+def with_estimates(name, scene, amplitudes, phases) -> dict:
+    """Return calls of the direct tier with its error estimate by a back end."""
     counts = [count for count in phases if count >= FEWEST]
-    seconds = []
+    calls = []
     for count in counts:
         answer = functools.partial(
             estimate.direct, scene, scene.gait, amplitudes, count
         )
-        seconds.append(quickest(answer, runs))
-    return {"phases": counts, "seconds": seconds}
+        calls.append(functools.partial(by_backend, name, answer))
+    return {"phases": counts, "calls": calls}
 
 
 def by_tiers(scene, runs) -> dict:
@@ -161,8 +175,8 @@ def by_tiers(scene, runs) -> dict:
     return found
 
 
-def by_peer(solve, scene, amplitudes, truth, counts, starts, runs) -> dict:
-    """Return errors and seconds of another program, whose velocities are those of the
+def by_peer(solve, scene, amplitudes, truth, counts, starts) -> dict:
+    """Return errors and calls of another program, whose velocities are those of the
     middle link and are integrated as ours are."""
 
     def nets(count, first):
@@ -174,12 +188,12 @@ def by_peer(solve, scene, amplitudes, truth, counts, starts, runs) -> dict:
         return np.array(found)
 
     errors = []
-    seconds = []
+    calls = []
     for count in counts:
         begun = first_phases(count, starts)
         errors.append([truth.error(nets(count, first), first) for first in begun])
-        seconds.append(quickest(functools.partial(nets, count, 0), runs))
-    return {"phases": counts, "error": errors, "seconds": seconds}
+        calls.append(functools.partial(nets, count, 0))
+    return {"phases": counts, "error": errors, "calls": calls}
 
 
 def in_mean_frame(net: np.ndarray, alpha: np.ndarray) -> np.ndarray:
