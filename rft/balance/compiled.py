@@ -13,6 +13,7 @@ from rft.balance import ahead
 from rft.effects.contact import NO_FACTOR, Problem, mapped
 from rft.formulas.momentum import frame_inertia
 from rft.formulas.newton import RESULT_ROWS, Descent, Limits, Net, with_momentum
+from rft.laws.batch import MediumBatch
 
 NET_ROWS = 15  # of the sums of forces: the numbers of a `Net`
 DOUBLE = np.dtype(float)
@@ -125,6 +126,8 @@ def solve(
     problem: Problem, descent: Descent, limits: Limits, guess: np.ndarray | None
 ) -> np.ndarray:
     """Solve all samples by one descent as `rft.balance.arrays.solve` does."""
+    if isinstance(problem.medium, MediumBatch):
+        return _solve_media(problem, descent, limits, guess)
     p = problem
     out = np.empty((RESULT_ROWS, problem.n_samples))
     mass = NO_ROWS
@@ -135,4 +138,19 @@ def solve(
     guess = plain(guess)
     arguments = load_arguments(p)
     kernels_of(type(p.law)).solve(arguments, mass, guess, descent, limits, out)
+    return out
+
+
+def _solve_media(
+    problem: Problem, descent: Descent, limits: Limits, guess: np.ndarray | None
+) -> np.ndarray:
+    """Solve the samples of a batch of media, one medium after the other, for a kernel
+    takes the numbers of one law."""
+    out = np.empty((RESULT_ROWS, problem.n_samples))
+    first = None
+    for of_medium, run in problem.by_medium():
+        if guess is not None:
+            first = guess[:, run]
+        of_run = limits._replace(residual=float(limits.residual[run.start]))
+        out[:, run] = solve(of_medium, descent, of_run, first)
     return out

@@ -122,12 +122,15 @@ def solve(
 
     def walk(share) -> None:
         for index in split(share, math.ceil(share.size / batch)):
-            problem = problem_at(index)
-            limits = _limits(problem, accuracy)
-            for i, ended in follow(problem, limits, driver.nets, *method):
-                solved = ended[RESIDUAL] <= limits.residual
-                store(index[i[solved]], ended[:, solved], limits)
-                results[EVALUATIONS, index[i[~solved]]] += ended[EVALUATIONS, ~solved]
+            for problem, run in problem_at(index).by_medium():
+                walk_together(problem, index[run])
+
+    def walk_together(problem, index) -> None:
+        limits = _limits(problem, accuracy)
+        for i, ended in follow(problem, limits, driver.nets, *method):
+            solved = ended[RESIDUAL] <= limits.residual
+            store(index[i[solved]], ended[:, solved], limits)
+            results[EVALUATIONS, index[i[~solved]]] += ended[EVALUATIONS, ~solved]
 
     unsolved = np.arange(size)
     methods: list = [QUICK, *WALKS, *SLOW]
@@ -148,6 +151,10 @@ def solve(
         if solved.all():
             break
         unsolved = np.flatnonzero(~solved)
+    else:
+        # A sample that its own limit leaves unsolved is above the largest one, too.
+        beyond = np.nextafter(limit.max(), np.inf)
+        results[RESIDUAL, unsolved] = np.maximum(results[RESIDUAL, unsolved], beyond)
     residual, evaluations, slowest = results[RESIDUAL:]
     stuck = (slowest < STUCK_BELOW * accuracy.rounding) & (not linear)
     return Solutions(
@@ -178,11 +185,14 @@ def _begin(descent: Descent, linear: bool, limits: Limits) -> Descent:
 def _limits(problem: Problem, accuracy: Accuracy) -> Limits:
     """Return the limits of a problem, whose residual allows for roundoff of the largest
     forces."""
-    largest = max(1.0, problem.lateral_drag / problem.axial_drag)
+    ratio = problem.lateral_drag / problem.axial_drag
+    largest = (
+        np.maximum(1.0, ratio) if isinstance(ratio, np.ndarray) else max(1.0, ratio)
+    )
     residual = accuracy.tolerance + 1e-14 * largest
     if problem.momentum_rate is not None:
         frame = problem.frame
         m = problem.momentum_rate
         inertia = m.rate * m.strength * frame.speed_scale / frame.force_scale
         residual += 1e-14 * np.max(inertia)
-    return Limits(float(accuracy.rounding), float(residual))
+    return Limits(float(accuracy.rounding), residual)
