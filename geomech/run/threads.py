@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import os
 from collections.abc import Iterator
 
 from threadpoolctl import ThreadpoolController
+
+from geomech.run import THREAD_VARIABLES
 
 
 @contextlib.contextmanager
@@ -25,8 +28,12 @@ def one_blas_thread() -> Iterator[None]:
 def _libraries() -> ThreadpoolController:
     """Return what controls the libraries, which takes milliseconds to find.
 
-    SciPy has a library of its own, which is found only once it is loaded."""
+    SciPy has a library of its own, which is found only once it is loaded. Where the
+    environment says one thread, as in commands and workers, it will take one when it is
+    needed, and is not loaded for this: that takes longer than many tasks."""
     import numpy  # noqa: F401
-    import scipy.linalg  # noqa: F401
+
+    if any(os.environ.get(name) != "1" for name in THREAD_VARIABLES):
+        import scipy.linalg  # noqa: F401
 
     return ThreadpoolController()

@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+import rft
 from geomech.core.errors import choose
 from geomech.mathematics.gaits import KINDS as GAITS
 from geomech.mathematics.gaits import Gait
@@ -153,6 +154,15 @@ class Scene(SceneRepr):
             if of_system:
                 parts["system"] = dataclasses.replace(system, **of_system)
             return dataclasses.replace(self, **parts)
+
+    def in_medium(self, medium: rft.Medium) -> Scene:
+        """Return the scene of a swimmer in another medium, which alone is checked: no
+        other part of a scene depends on it."""
+        swimmer = self.system
+        assert isinstance(swimmer, Swimmer)
+        new = object.__new__(type(self))
+        new.__dict__.update(vars(self), system=swimmer.in_medium(medium))
+        return new
 
     def cycle(
         self,

@@ -49,6 +49,16 @@ def from_tables(tables: Mapping, name: str, text: str) -> Scene:
         return Scene(system, gait, numerics, name, text, files)
 
 
+def with_medium(scene: Scene, table: Mapping) -> Scene:
+    """Return the scene of a swimmer with the medium of a table [medium] in place of its
+    own, as `from_tables` does, but in a tenth of the time: all else is checked
+    already. Refusal if the table makes no medium that the swimmer takes."""
+    source = reader.Source(scene.name, Scene.example)
+    with located(scene.name):
+        medium = reader.read_section(source, "medium", table, SWIMMER["medium"])
+        return scene.in_medium(medium)
+
+
 def _system_table(tables: Mapping, name: str) -> dict:
     """Return the table of the system. [medium], [body] and [[effects]] are the short
     form of a swimmer; they may also stand in its table [system]."""

@@ -5,19 +5,24 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from geomech.mathematics.systems.swimmer import Swimmer
+from geomech.scenes.model import Scene
 from geomech.scenes.read import from_tables
+from geomech.scenes.swimming import with_medium
 from rft.core.checks import real_array
 from rft.core.refusal import Refusal
 
 MAX_POINTS = 100_000_000
 # Values of a parameter for each of which a scene is built as a test, in some 0.5 ms.
 MAX_TESTED_VALUES = 200
+MEDIUM = "medium."  # first letters of its parameters
+MOST_KNOWN = 64  # scenes of a grid that are kept to read other media into
 SECTIONS = ("medium", "body", "gait", "numerics", "system", "physical", "robot")
 
 
@@ -60,6 +65,12 @@ class Grid:
     @property
     def shape(self) -> tuple[int, ...]:
         return tuple(map(len, self.over.values()))
+
+    @property
+    def n_scenes(self) -> int:
+        """Number of points that differ in more than their medium."""
+        outer = zip(self._outer_names, self.points.sizes)
+        return math.prod(size for name, size in outer if not _is_of_medium(name))
 
     @property
     def total(self) -> int:
@@ -136,18 +147,53 @@ def _checked_list(name: str, values: Any) -> list[float]:
     return array.tolist()
 
 
-class SceneFactory(NamedTuple):
-    """Function from a point of a grid, values by ``names``, to the scene there."""
+@dataclass(frozen=True)
+class SceneFactory:
+    """Function from a point of a grid, values by ``names``, to the scene there.
+
+    known: scenes that were read, under their values other than those of the medium. At
+    a point that differs from one of them in its medium alone, only that is read."""
 
     tables: dict[str, Any]
     scene: Any
     names: tuple[str, ...]
+    known: dict[tuple, Any] = field(default_factory=dict, compare=False, repr=False)
+
+    def __reduce__(self) -> tuple:
+        return SceneFactory, (self.tables, self.scene, self.names)
 
     def __call__(self, point: tuple[float, ...]) -> Any:
+        medium = self.tables.get("medium", {})
+        others = []
+        for name, value in zip(self.names, point):
+            if _is_of_medium(name):
+                medium = _with_key(medium, name.removeprefix(MEDIUM), value)
+            else:
+                others.append(value)
+        known = self.known.get(tuple(others))
+        if known is not None:
+            return with_medium(known, medium)
+
         tables = self.tables
         for name, value in zip(self.names, point):
             tables = with_parameter(tables, name, value)
-        return from_tables(tables, self.scene.name, self.scene.text)
+        scene = from_tables(tables, self.scene.name, self.scene.text)
+        if self._has_separate_medium(scene):
+            if len(self.known) == MOST_KNOWN:
+                self.known.clear()
+            self.known[tuple(others)] = scene
+        return scene
+
+    def _has_separate_medium(self, scene: Any) -> bool:
+        """Return whether the table [medium] describes no part of a scene but its
+        medium."""
+        has_swimmer = isinstance(scene, Scene) and type(scene.system) is Swimmer
+        return has_swimmer and "medium" not in self.tables.get("system", {})
+
+
+def _is_of_medium(name: str) -> bool:
+    """Return whether a parameter is a key of [medium]."""
+    return name.startswith(MEDIUM)
 
 
 class Points:

@@ -183,4 +183,5 @@ def solve(
                 iterate = take(iterate, rest)
                 v = take(v, rest)
                 mass = take(mass, rest)
+                limits = take(limits, rest)
     return out

@@ -24,6 +24,7 @@ from rft.bodies.chain import Chain
 from rft.core.threads import run_shares, thread_count
 from rft.effects.contact import Assembly
 from rft.formulas.link import Additions
+from rft.laws.batch import MediumBatch
 from rft.laws.records import is_compilable
 
 NO_ADDITIONS = Additions(False, False, False, False, False)
@@ -61,6 +62,7 @@ def chain_numbers(assembly: Assembly, accuracy: Accuracy) -> ChainNumbers | None
     viscous = getattr(assembly.medium, "viscous", None)
     has_form = assembly.homogeneous or assembly.linear or viscous is not None
     is_plain = type(body) is Chain and not assembly.effects
+    is_plain = is_plain and not isinstance(assembly.medium, MediumBatch)
     if not (is_plain and has_form and is_compilable(assembly.law)):
         return None
     unit = assembly.axial_drag

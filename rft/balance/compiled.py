@@ -14,6 +14,7 @@ from rft.bodies.base import Elements
 from rft.effects.contact import NO_FACTOR, Problem
 from rft.formulas.momentum import frame_inertia
 from rft.formulas.newton import RESULT_ROWS, Descent, Limits
+from rft.laws.batch import MediumBatch
 
 DOUBLE = np.dtype(float)
 NO_GUESS = np.zeros((3, 0))
@@ -199,6 +200,8 @@ def solve(
     known: Known | None = None,
 ) -> np.ndarray:
     """Solve all samples by one descent as `rft.balance.arrays.solve` does."""
+    if isinstance(problem.medium, MediumBatch):
+        return _solve_media(problem, descent, limits, guess)
     p = problem
     out = np.empty((RESULT_ROWS, problem.n_samples))
     if guess is None:
@@ -226,3 +229,18 @@ def mass_of(problem: Problem) -> np.ndarray:
     if problem.momentum_rate is None:
         return NO_ROWS
     return stacked(frame_inertia(problem.sides.elements, problem.momentum_rate))
+
+
+def _solve_media(
+    problem: Problem, descent: Descent, limits: Limits, guess: np.ndarray | None
+) -> np.ndarray:
+    """Solve the samples of a batch of media, one medium after the other, for a kernel
+    takes the numbers of one law."""
+    out = np.empty((RESULT_ROWS, problem.n_samples))
+    first = None
+    for of_medium, run in problem.by_medium():
+        if guess is not None:
+            first = guess[:, run]
+        of_run = limits._replace(residual=float(limits.residual[run.start]))
+        out[:, run] = solve(of_medium, descent, of_run, first)
+    return out

@@ -111,7 +111,8 @@ def solve(
         report(size, assembly.n_law_points, linear)
         solved = results[RESIDUAL] <= limits.residual
         if solved.all():
-            return _solutions(results, scale, limits.residual, accuracy, linear)
+            limit = float(np.max(limits.residual))
+            return _solutions(results, scale, limit, accuracy, linear)
         limit = np.full(size, limits.residual)
         unsolved = np.flatnonzero(~solved)
     else:
@@ -143,12 +144,15 @@ def solve(
 
     def walk(share) -> None:
         for index in split(share, math.ceil(share.size / batch)):
-            problem = problem_at(index)
-            limits = _limits(problem, accuracy)
-            for i, ended in walk_all(problem, limits, *method):
-                solved = ended[RESIDUAL] <= limits.residual
-                store(index[i[solved]], ended[:, solved], limits)
-                results[EVALUATIONS, index[i[~solved]]] += ended[EVALUATIONS, ~solved]
+            for problem, run in problem_at(index).by_medium():
+                walk_together(problem, index[run])
+
+    def walk_together(problem, index) -> None:
+        limits = _limits(problem, accuracy)
+        for i, ended in walk_all(problem, limits, *method):
+            solved = ended[RESIDUAL] <= limits.residual
+            store(index[i[solved]], ended[:, solved], limits)
+            results[EVALUATIONS, index[i[~solved]]] += ended[EVALUATIONS, ~solved]
 
     for method in methods:
         active = unsolved
@@ -163,6 +167,10 @@ def solve(
         if solved.all():
             break
         unsolved = np.flatnonzero(~solved)
+    else:
+        # A sample that its own limit leaves unsolved is above the largest one, too.
+        beyond = np.nextafter(limit.max(), np.inf)
+        results[RESIDUAL, unsolved] = np.maximum(results[RESIDUAL, unsolved], beyond)
     limit = float(limit.max(initial=0.0))
     return _solutions(results, scale, limit, accuracy, linear)
 
@@ -207,15 +215,18 @@ def _limits(problem: Problem, accuracy: Accuracy) -> Limits:
         frame = problem.frame
         m = problem.momentum_rate
         inertia = m.rate * m.strength * frame.speed_scale / frame.force_scale
-        residual += 1e-14 * np.max(inertia)
-    return Limits(rounding, float(residual))
+        residual += 1e-14 * float(np.max(inertia))
+    return Limits(rounding, residual)
 
 
 def limits_of(drag: Problem | Assembly, accuracy: Accuracy) -> Limits:
     """Return the limits of a massless body with the largest forces of its drag."""
-    largest = max(1.0, drag.lateral_drag / drag.axial_drag)
-    residual = accuracy.tolerance + 1e-14 * largest
-    return Limits(float(accuracy.rounding), float(residual))
+    ratio = drag.lateral_drag / drag.axial_drag
+    if isinstance(ratio, np.ndarray):
+        largest = np.maximum(1.0, ratio)  # of a batch of media
+    else:
+        largest = max(1.0, ratio)
+    return Limits(float(accuracy.rounding), accuracy.tolerance + 1e-14 * largest)
 
 
 def from_guess(

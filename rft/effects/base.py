@@ -79,6 +79,9 @@ class Effect:
     limit : values of the parameters at which the effect vanishes, as text.
     order : order at which it vanishes there.
     cost : work beyond that of the plain force law, as text.
+    mixes_media : whether samples of a batch may be in different media: `apply` then
+        reads any number of the medium by `rft.laws.batch.for_samples`, and drags of the
+        problem are arrays.
     batched : names of parameters that may be arrays (B,), one number for each sample of
         a batch.
     drift_tolerance : change of displacement from cycle to cycle, body lengths, below
@@ -113,6 +116,7 @@ class Effect:
     kind = "effect"
     breaks = NONE
     adds_points = False
+    mixes_media = False
     limit = ""
     order = 1
     cost = ""

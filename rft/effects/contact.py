@@ -6,10 +6,11 @@ The last axis of every array is that of the samples, or has one column for all o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rft.bodies.base import Body, Elements, checked_body, joint_speed
 from rft.bodies.pieces import subdivide
@@ -18,6 +19,7 @@ from rft.formulas.link import Additions, Factor, Incline, Memory
 from rft.formulas.momentum import MomentumRate
 from rft.formulas.newton import Frame
 from rft.laws.base import cached_if_immutable, is_linear, require_drag, speed_exponent
+from rft.laws.batch import MediumBatch, members
 from rft.laws.records import record
 
 MOST_PIECES = 10_000  # to a body length
@@ -71,19 +73,20 @@ class Contact(NamedTuple):
 class Problem(NamedTuple):
     """The balance of forces on a body, for a batch of samples.
 
-    medium: the law, as given. law: its record (`rft.laws.records`). axial_drag: unit of
-    force, the drag on the whole straight body along itself at unit speed (across if
-    there is none along). lateral_drag: that drag across. homogeneous, linear: whether
-    drag stays, or doubles, when velocities double. sides: the body's elements, under
-    the law. points: points attached to them, under dry terms that face along the body,
-    point_terms (T, 3, n, 1). quadratic_drag: (1, 1) or (1, B), force over |v_n| v_n.
+    medium: the law, as given, or a batch of media (`rft.laws.batch`). law: its record
+    (`rft.laws.records`). axial_drag: unit of force, the drag on the whole straight body
+    along itself at unit speed (across if there is none along), (B,) for a batch of
+    media. lateral_drag: that drag across. homogeneous, linear: whether drag stays, or
+    doubles, when velocities double. sides: the body's elements, under the law. points:
+    points attached to them, under dry terms that face along the body, point_terms
+    (T, 3, n, B or 1). quadratic_drag: (1, 1) or (1, B), force over |v_n| v_n.
     memory: of the ground at the elements. momentum_rate: of the body, None without
     mass. frame: means and scales of the samples."""
 
     medium: Any
     law: Any
-    axial_drag: float
-    lateral_drag: float
+    axial_drag: float | np.ndarray
+    lateral_drag: float | np.ndarray
     homogeneous: bool
     linear: bool
     sides: Contact
@@ -124,24 +127,47 @@ class Problem(NamedTuple):
 
     def take(self, index) -> Problem:
         """Return the problem of the samples ``index``."""
-        # The law, in the first six fields, is the same for all samples.
-        return Problem(*self[:6], *take(self[6:], index))
+        return Problem(*take_law(self[:6], index), *take(self[6:], index))
 
     def split(self, count: int) -> list[Problem]:
         """Return ``count`` problems with equal numbers of samples in a row."""
         return [Problem(*self[:6], *rest) for rest in split(self[6:], count)]
 
-    def with_points(
-        self, points: Contact, terms: Sequence[tuple[float, float, float]]
-    ) -> Problem:
+    def by_medium(self) -> Iterator[tuple[Problem, slice]]:
+        """Yield the problem of each run of samples in one medium, and the run."""
+        if not isinstance(self.medium, MediumBatch):
+            yield self, slice(0, self.n_samples)
+            return
+        media, runs = zip(*self.medium.runs())
+        samples = self[6:]
+        if len({run.stop - run.start for run in runs}) == 1:
+            parts = split(samples, len(runs))
+        else:
+            parts = [take(samples, run) for run in runs]
+        law = self.law
+        for medium, run, part in zip(media, runs, parts):
+            i = run.start
+            law_and_units = (
+                medium,
+                law._replace(viscous=law.viscous[..., i], dry=law.dry[..., i]),
+                float(self.axial_drag[i]),
+                float(self.lateral_drag[i]),
+                self.homogeneous,
+                self.linear,
+            )
+            yield Problem(*law_and_units, *part), run
+
+    def with_points(self, points: Contact, terms: ArrayLike) -> Problem:
         """Return the problem with more points, each with all of these dry terms
-        (q, k_t, k_n)."""
-        new = np.array(terms, float)[:, :, None, None]
-        new = np.repeat(new, len(points.station), 2)
+        (q, k_t, k_n), (T, 3), or (T, 3, B) for each sample."""
+        new = np.array(terms, float)
+        new = np.repeat(new.reshape(*new.shape[:2], 1, -1), len(points.station), 2)
         if len(self.points.station):
             old = self.point_terms
             count = max(len(old), len(new))
-            new = np.concatenate([_padded(old, count), _padded(new, count)], 2)
+            columns = max(old.shape[-1], new.shape[-1])
+            both = [_padded(old, count, columns), _padded(new, count, columns)]
+            new = np.concatenate(both, 2)
         return self._replace(points=self.points.joined(points), point_terms=new)
 
 
@@ -149,9 +175,10 @@ NO_TERM = np.array([1.0, 0.0, 0.0])[:, None, None]  # (q, k_t, k_n)
 NO_POINT_TERMS = np.zeros((0, 3, 0, 1))
 
 
-def _padded(terms: np.ndarray, count: int) -> np.ndarray:
-    """Return dry terms (T, 3, n, 1) of points as ``count`` terms, the added ones
-    without drag."""
+def _padded(terms: np.ndarray, count: int, columns: int) -> np.ndarray:
+    """Return dry terms (T, 3, n, B or 1) of points as ``count`` terms, the added ones
+    without drag, with ``columns`` samples."""
+    terms = np.broadcast_to(terms, (*terms.shape[:3], columns))
     return np.concatenate(
         [terms, np.broadcast_to(NO_TERM, (count - len(terms), *terms.shape[1:]))]
     )
@@ -203,6 +230,16 @@ def split(record, count: int) -> list:
     return list(zip(*parts))
 
 
+def take_law(law_and_units: tuple, index) -> tuple:
+    """Return the first six fields of a `Problem` or an `Assembly` for the samples
+    ``index``: a law is the same for all, a batch of media is not."""
+    medium, law, axial_drag, lateral_drag, *facts = law_and_units
+    if not isinstance(medium, MediumBatch):
+        return law_and_units
+    drags = axial_drag[index], lateral_drag[index]
+    return medium.take(index), take(law, index), *drags, *facts
+
+
 class Assembly(NamedTuple):
     """A law, a subdivided body and effects: everything that does not depend on shapes
     and rates, built by `assemble`.
@@ -215,8 +252,8 @@ class Assembly(NamedTuple):
 
     medium: Any
     law: Any
-    axial_drag: float
-    lateral_drag: float
+    axial_drag: float | np.ndarray
+    lateral_drag: float | np.ndarray
     homogeneous: bool
     linear: bool
     body: Body
@@ -241,11 +278,15 @@ class Assembly(NamedTuple):
         return problem
 
     def take(self, index) -> Assembly:
-        """Return the assembly with the effects' parameters at the samples ``index``."""
+        """Return the assembly with the media and the effects' parameters at the samples
+        ``index``."""
+        assembly = self
+        if isinstance(self.medium, MediumBatch):
+            assembly = Assembly(*take_law(self[:6], index), *self[6:])
         effects = tuple(effect.take(index) for effect in self.effects)
         if all(a is b for a, b in zip(effects, self.effects)):
-            return self
-        return self._replace(effects=effects)
+            return assembly
+        return assembly._replace(effects=effects)
 
     def without_effects(self, alpha, alphadot, speed) -> Problem:
         """Return the balance without effects."""
@@ -283,14 +324,16 @@ def assemble(
 
 @cached_if_immutable
 def _assembled(medium, body, effects, rule, pieces) -> Assembly:
-    require_drag(medium)
+    for each in members(medium):
+        require_drag(each)
     checked_body(body)
     in_range("pieces", pieces, 1, MOST_PIECES, whole=True)
     if any(effect.varies_along for effect in effects):
         body = subdivide(body, pieces)
     effects = tuple(effect.in_body_lengths(body.length) for effect in effects)
-    for effect in effects:
-        effect.check(medium)
+    for each in members(medium):
+        for effect in effects:
+            effect.check(each)
     zero = np.zeros((body.joints, 1))
     e = body.motion(zero, zero)
     station = np.cumsum(2 * e.half, 0) - e.half
@@ -299,13 +342,10 @@ def _assembled(medium, body, effects, rule, pieces) -> Assembly:
     # whatever their order.
     ordered = tuple(sorted(effects, key=lambda effect: not effect.adds_points))
     fraction = e.half / e.half.sum()
-    along = abs(float(medium.traction(1.0, 0.0)[0]))
-    across = abs(float(medium.traction(0.0, 1.0)[1]))
     law_and_units = (
         medium,
         record(medium, rule),
-        along or across,
-        across,
+        *_drags(medium),
         speed_exponent(medium) == 0,
         is_linear(medium),
     )
@@ -326,6 +366,15 @@ def _assembled(medium, body, effects, rule, pieces) -> Assembly:
     return assembly._replace(
         effects=ordered, n_elements=n_elements, n_law_points=n_law_points
     )
+
+
+def _drags(medium) -> tuple:
+    """Return the axial and the lateral drag of `Problem`."""
+    along = medium.traction(1.0, 0.0)[0]
+    across = medium.traction(0.0, 1.0)[1]
+    if isinstance(medium, MediumBatch):
+        return np.where(along != 0, abs(along), abs(across)), abs(across)
+    return abs(float(along)) or abs(float(across)), abs(float(across))
 
 
 def force_scale(assembly: Assembly, speed: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from rft.core.refusal import require
 from rft.effects.base import EFFECTS, Effect, InMetres
 from rft.effects.contact import Contact, Problem
 from rft.formulas.link import dry_point
+from rft.laws.batch import for_samples
 from rft.laws.granular import Granular
 
 
@@ -62,6 +63,7 @@ class EndCaps(Effect):
     ] = None
 
     kind = "end-caps"
+    mixes_media = True
     metres = {"radius": InMetres("radius_m")}
     adds_points = odd = True
     limit = "radius = 0"
@@ -85,7 +87,8 @@ class EndCaps(Effect):
         ends = e.attached_points([0, -1], e.half[[0, -1]] * [[-1.0], [1.0]], weight)
         station = np.array([[0.0], [1.0]])
         points = Contact(ends, station, buried=np.ones((2, 1)))
-        return problem.with_points(points, self.terms(problem.medium))
+        terms = for_samples(problem.medium, self.terms)
+        return problem.with_points(points, terms)
 
     def traction(
         self, medium: Granular, v_t: Any, v_n: Any, rounding: Any = 0.0

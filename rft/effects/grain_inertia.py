@@ -15,6 +15,7 @@ from rft.core.refusal import require
 from rft.effects.base import EFFECTS, Effect
 from rft.effects.contact import Problem
 from rft.laws.base import is_linear
+from rft.laws.batch import for_samples
 
 # k of Eq. 2 for loosely packed 0.3 mm glass (Zhang and Goldman 2014); assumed where k
 # is unknown
@@ -54,6 +55,7 @@ class GrainInertia(Effect):
     ] = None
 
     kind = "grain-inertia"
+    mixes_media = True
     odd = True
     breaks = Premise.RATE_INDEPENDENT
     limit = "frequency = 0"
@@ -83,9 +85,9 @@ class GrainInertia(Effect):
 
     def apply(self, problem: Problem, site: Any = None, state: Any = None) -> Problem:
         speed_per_rad = 2 * np.pi * self.frequency * self.length
-        k = self._given_k(problem.medium)
+        k = self.k
         if k is None:
-            k = ASSUMED_K
+            k = for_samples(problem.medium, _k_of)
         strength = self.strength * speed_per_rad**2 / (k * GRAVITY * self.depth)
         # The flux of momentum does not depend on the pressure of the ground, so the
         # factors of the drag leave it alone.
@@ -100,3 +102,9 @@ class GrainInertia(Effect):
                 frequency=1.2, length=0.4, depth=0.07, strength=x
             ),
         }
+
+
+def _k_of(medium) -> float:
+    """Return the k of a medium, or the assumed one."""
+    k = getattr(medium, "k", None)
+    return ASSUMED_K if k is None else k

@@ -52,6 +52,7 @@ class SkinFriction(Effect):
     ] = 0.15
 
     kind = "skin-friction"
+    mixes_media = True
     limit = "forward = backward = reference"
     cost = "one multiplication an element"
     batched = ("forward", "backward", "reference")

@@ -95,13 +95,14 @@ class Descent(NamedTuple):
 class Limits(NamedTuple):
     """Required accuracy, and limits of the steps.
 
-    rounding: of the last level. residual: largest of a solution. largest_step: change
-    of the velocity of the body's mean place and of its rotation rate; no body moves
-    that fast. least_damping: damping at which a step is accepted though the residual
-    grows. damping_growth: factor of the damping after an accepted step."""
+    rounding: of the last level. residual: largest of a solution, (B,) in a batch of
+    media. largest_step: change of the velocity of the body's mean place and of its
+    rotation rate; no body moves that fast. least_damping: damping at which a step is
+    accepted though the residual grows. damping_growth: factor of the damping after an
+    accepted step."""
 
     rounding: float
-    residual: float
+    residual: float | np.ndarray
     largest_step: float = 3.0
     least_damping: float = 2.0**-12
     damping_growth: float = 2.0

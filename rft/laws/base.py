@@ -148,7 +148,9 @@ class TermNumbers(NamedTuple):
 
 def term_numbers(medium) -> TermNumbers:
     """Return the terms of a medium in closed form as arrays, those that act along the
-    element first."""
+    element first; of a batch (`rft.laws.batch`) with the samples on a last axis."""
+    if hasattr(medium, "terms_of_samples"):
+        return medium.terms_of_samples
     terms = sorted(medium.dry, key=lambda term: term[1] == 0.0)
     return TermNumbers(
         np.array([medium.viscous], float), np.array(terms, float).reshape(-1, 3)
@@ -238,6 +240,8 @@ VELOCITIES = SPEEDS * np.cos(DIRECTIONS), SPEEDS * np.sin(DIRECTIONS)
 def is_odd(medium: Medium) -> bool:
     """Return whether f(-v) = -f(v) at VELOCITIES, so that the ends of an element are
     alike."""
+    if _is_sum_of_terms(medium):
+        return True
     v_t, v_n = VELOCITIES
     with np.errstate(all="ignore"):
         forward = _traction(medium, v_t, v_n)
@@ -285,7 +289,12 @@ def require_law(medium: Medium) -> None:
     )
 
 
-def _has_only_drags(medium: TermLaw) -> bool:
+def _is_sum_of_terms(medium: Medium) -> bool:
+    """Return whether the traction of a medium is the sum of its terms."""
+    return getattr(type(medium), "traction", None) is TermLaw.traction
+
+
+def has_only_drags(medium: TermLaw) -> bool:
     """Return whether no term of a closed form pushes and some term drags."""
     coefficients = [*medium.viscous]
     for _, k_t, k_n in medium.dry:
@@ -297,8 +306,7 @@ def require_drag(medium: Medium) -> None:
     """Raise ValueError if the medium pushes at one of VELOCITIES, that is if its force
     there has a part along the motion, or if it has no drag at all."""
     require_law(medium)
-    is_term_law = getattr(type(medium), "traction", None) is TermLaw.traction
-    if is_term_law and _has_only_drags(medium):
+    if _is_sum_of_terms(medium) and has_only_drags(medium):
         return
     v_t, v_n = VELOCITIES
     with np.errstate(all="ignore"):
@@ -362,7 +370,7 @@ def speed_exponent(medium: Medium) -> float | None:
     if is_closed(medium):
         if not medium.dry:
             return 1.0
-        return None if any(medium.viscous) else 0.0
+        return None if np.any(medium.viscous) else 0.0
     speeds = np.logspace(-3, 1, 5)[:, None]
     with np.errstate(all="ignore"):
         f = _traction(medium, speeds * np.cos(DIRECTIONS), speeds * np.sin(DIRECTIONS))

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from registry import MEDIA
+from registry import EFFECTS, MEDIA
 from test_loads import CubicDrag
 
 from geomech.mathematics.gaits import Circle
@@ -19,8 +19,10 @@ from rft import (
     body_velocity,
     time_steps,
 )
+from rft.effects import engine
 from rft.laws import base
 from rft.laws.base import TermLaw, require_drag
+from rft.laws.batch import batch_form, batched_medium
 from rft.laws.catalogue import SURFACE_ALONG_RANGE
 
 SURFACE = CATALOGUE["glass-0.3mm-surface"].medium
@@ -200,3 +202,62 @@ def test_a_covariance_says_what_is_open_and_changes_no_force(covariance, names):
     assert medium.uncertain == names
     assert (hash(medium) == hash(SURE)) == (medium == SURE) == (covariance is None)
     np.testing.assert_array_equal(medium.traction(*v), SURE.traction(*v))
+
+
+BATCHES = {}
+for _medium in MEDIA.values():
+    if batch_form(_medium):
+        BATCHES.setdefault(batch_form(_medium), []).append(_medium)
+ADDED = {
+    name: (cases[0](0.3),)
+    for name, cases in EFFECTS.items()
+    if cases[0](0.3).mixes_media and engine([cases[0](0.3)]) == "algebraic"
+}
+
+
+@pytest.mark.parametrize("added", [None, *ADDED])
+@pytest.mark.parametrize("form", BATCHES, ids=lambda form: form[0].__name__)
+def test_media_that_share_a_batch_are_solved_as_each_alone(form, added, solved_by):
+    media = [*BATCHES[form], *map(dataclasses.replace, BATCHES[form])]
+    effects = ADDED.get(added, ())
+    try:
+        for medium in media:
+            for effect in effects:
+                effect.check(medium)
+    except ValueError:
+        pytest.skip("the effect takes no such medium")
+    rng = np.random.default_rng(3)
+    counts = rng.integers(1, 12, len(media))
+    alpha = rng.uniform(-2.2, 2.2, (counts.sum(), 2))
+    alphadot = rng.normal(size=alpha.shape)
+    alphadot[::7] = 0.0
+    start = rng.normal(size=(len(alpha), 3))
+
+    def solved(medium, part, loads, begun):
+        return body_velocity(
+            medium,
+            Chain((1, 1.4, 0.8)),
+            alpha[part],
+            alphadot[part],
+            effects=effects,
+            loads=loads,
+            start=start[part] if begun else None,
+        )
+
+    asked = [("exact", False), ("exact", True)]
+    if solved_by == "numpy":  # compiled code takes a minute to compile for the rule
+        asked.append(("midpoint:2", False))
+    for loads, begun in asked:
+        together = solved(batched_medium(media, counts), slice(None), loads, begun)
+        stops = np.cumsum(counts)
+        for medium, count, stop in zip(media, counts, stops):
+            part = slice(stop - count, stop)
+            alone = solved(medium, part, loads, begun)
+            np.testing.assert_allclose(together.xi[part], alone.xi, rtol=0, atol=1e-12)
+            np.testing.assert_array_equal(together.code[part], alone.code)
+
+
+def test_only_media_of_one_form_share_a_batch():
+    for others in (Coulomb(), CubicDrag()):
+        with pytest.raises(ValueError, match="must be of one law"):
+            batched_medium([Granular(1.8, 0.24), others], [1, 1])

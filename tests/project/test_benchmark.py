@@ -22,6 +22,7 @@ from geomech.mathematics.geometry import connection
 from geomech.mathematics.systems import Solver, Swimmer
 from geomech.mathematics.tiers.direct import direct
 from geomech.scenes import load
+from geomech.studies.displacement.sweep import sweep
 from geomech.studies.scene_tables import SceneTables
 from rft import (
     CATALOGUE,
@@ -335,6 +336,28 @@ def test_a_sweep_of_ten_thousand_points_on_two_cores(over, tmp_path):
         told = f"{count} processes {wall:.1f} s, computing {computing:.1f} s"
         print(f"\n10,000 points: {told}", end="")
     assert (tmp_path / "1.nc").read_bytes() == (tmp_path / "2.nc").read_bytes()
+
+
+@pytest.mark.parametrize("how", backends())
+def test_a_medium_of_a_sweep_over_one_asked_alone(how):
+    """With the error of each: 256 media by a sweep, in batches of 64, and some of them
+    each from the tables of its scene."""
+    over = {
+        "medium.C": np.linspace(1, 3, 16),
+        "medium.gamma0": np.linspace(0.1, 0.4, 16),
+    }
+    scene = load("three-link-glass").with_numerics(backend=how)
+    some = [{key: [values[k]] for key, values in over.items()} for k in (2, 7, 12)]
+
+    def alone():
+        for point in some:
+            sweep(scene, point)
+
+    took = in_turn({"together": lambda: sweep(scene, over), "alone": alone})
+    each = took["together"] / 256
+    ratio = took["alone"] / len(some) / each
+    print(f"\n{how}: {1e3 * each:.2f} ms a medium, alone {ratio:.0f} times as long")
+    assert ratio > 6
 
 
 HEXAPOD = """<mujoco><size nuserdata="310000"/><option timestep="0.0005"/><worldbody><geom type="plane" size="5 5 1"/>

@@ -1,11 +1,14 @@
 """Sweeps over a scene's parameters: right at every point, in as few batches as may
 be."""
 
+import itertools
+
 import numpy as np
 import pytest
 from tabled import swept_table
 
 from geomech import scenes
+from geomech.scenes import kinds
 from geomech.studies import grid
 from geomech.studies.displacement import sweep
 from geomech.studies.estimates import estimate
@@ -53,7 +56,86 @@ def test_parameters_of_a_medium_given_by_name_can_be_swept():
     found = swept(scene, {"medium.gamma0_deg": [10.0, 20.0]})["displacement"]
     C = CATALOGUE["glass-0.3mm-close"].medium.C
     alone = GLASS.changed(medium=Granular(C=C, gamma0=np.radians(20.0)))
-    np.testing.assert_allclose(found[1], net(alone), rtol=1e-9)
+    np.testing.assert_allclose(found[1], net(alone), rtol=1e-9, atol=1e-12)
+
+
+OWN = """
+import math
+from dataclasses import dataclass
+from rft.laws import TermLaw
+from rft.effects import Effect
+
+@dataclass(frozen=True)
+class Steps(TermLaw):
+    C: float = 1.0
+    law = "own-sum"
+
+    @property
+    def dry(self):
+        q = 0.1 if self.C < 1 else 0.3
+        return (1.0, 1.0, 1.0), (q, 0.0, self.C * math.sqrt(1 - q * q))
+
+@dataclass(frozen=True)
+class Power:
+    power: float = 0.0
+    law = "own-law"
+
+    def traction(self, v_t, v_n, eps=0.0):
+        factor = (v_t**2 + v_n**2 + eps**2) ** (0.5 * self.power)
+        return factor * v_t, (2.0 if self.power > 0 else 3.0) * factor * v_n
+
+@dataclass(frozen=True)
+class Heavier(Effect):
+    kind = "own-effect"
+
+    def apply(self, problem, site=None, state=None):
+        across = 1.0 + math.sqrt(problem.medium.C)
+        return problem._replace(sides=problem.sides.with_factors(1.0, 1.0, across))
+"""
+
+
+GRAINS = '"grain-inertia"\nfrequency = 1.0\nlength = 0.1\ndepth = 0.05'
+SAND = '"granular"\nC = 1.8\ngamma0 = 0.24'
+CAPS = '"end-caps"\nradius = 0.05'
+MEDIA = {
+    "granular": (SAND, "", {"C": [0.0, 1.8, 40.0], "gamma0_deg": [3.0, 30.0]}),
+    "viscous": ('"viscous"', "", {"ratio": [1.0, 2.0, 50.0]}),
+    "surface": (
+        '"surface"\nC = 1\ngamma0 = 0.1\nacross = 1',
+        "",
+        {"across": [0.5, 9.0]},
+    ),
+    "end caps": (SAND, CAPS, {"C": [0.0, 1.8], "gamma0": [0.1, 0.3]}),
+    "grains' k": (SAND, GRAINS, {"k": [1.0, 3.0]}),
+    "own sum": ('"own-sum"', "", {"C": [0.5, 1.5, 3.0]}),
+    "own law": ('"own-law"', "", {"power": [-0.5, 0.3]}),
+    "own effect": (SAND, '"own-effect"', {"C": [0.0, 1.8]}),
+}
+
+
+@pytest.mark.parametrize("name", MEDIA)
+def test_a_medium_of_a_sweep_is_as_it_is_alone(name, solved_by, tmp_path, own_parts):
+    """Whether it shares a batch or cannot, inside or outside of another parameter."""
+    file = tmp_path / "own.py"
+    file.write_text(OWN)
+    kinds.load_file(file)
+    law, effect, numbers = MEDIA[name]
+    text = f'[medium]\nlaw = {law}\n[body]\nkind = "chain"\n[gait]\nkind = "circle"'
+    if effect:
+        text += f"\n[[effects]]\nkind = {effect}"
+    scene = scenes.parse(text, "own").with_numerics(phases=32)
+    media = {f"medium.{key}": values for key, values in numbers.items()}
+    pieces = {"numerics.regularisation": [1e-5, 1e-6], "gait.amplitude": [0.4, 0.8]}
+    for over in (media | pieces, pieces | media):
+        together = swept(scene, over)
+        shape = together["estimate"].shape
+        for k in itertools.islice(np.ndindex(shape), None, None, 3):
+            point = {key: [values[i]] for (key, values), i in zip(over.items(), k)}
+            alone = swept(scene, point)
+            for column in ("displacement", "estimate"):
+                one = alone[column].reshape(together[column][k].shape)
+                np.testing.assert_allclose(together[column][k], one, atol=1e-12)
+        assert np.ptp(together["displacement"][..., 0]) > 1e-4
 
 
 def test_effects_and_whole_numbers_can_be_swept():
@@ -63,7 +145,6 @@ def test_effects_and_whole_numbers_can_be_swept():
 
 
 INERTIA = '"body-inertia"\nmass = 0.02\nfrequency = 1.0\nlength = 0.1\ndrag = 1.0'
-GRAINS = '"grain-inertia"\nfrequency = 1.0\nlength = 0.1\ndepth = 0.05'
 GROUND = '"disturbed-ground"\nradius = 0.05\nweakening = 0.0'
 BATCHES = {
     "gait.waves": ((), [0.8, 1.0, 1.5]),

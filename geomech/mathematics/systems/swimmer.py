@@ -60,6 +60,7 @@ from rft.laws import (
     speed_exponent,
 )
 from rft.laws.base import is_odd, require_law
+from rft.laws.batch import MediumBatch, members
 from rft.laws.catalogue import DEPTH
 from rft.laws.records import record, rule_for
 from rft.motion.stepping import Row, State, Stepping
@@ -97,16 +98,13 @@ class Swimmer:
     kind = "swimmer"
 
     def __post_init__(self):
-        require_law(self.medium)
         checked_body(self.body)
-        refuse_mutable(self.medium, self.body)
+        refuse_mutable(self.body)
         rft.effects.broken_premises(self.effects)
         # Tables are stored by a hash, which a list has not.
         object.__setattr__(self, "effects", tuple(self.effects))
         if not isinstance(self.solver, Solver):
             raise Refusal("solver must be Solver(...)", value=self.solver)
-        with located("[numerics]"):
-            record(self.medium, self.solver.loads)
         self._agree()
         kinds = [type(e) for e in self.effects]
         for effect in self.effects:
@@ -115,8 +113,27 @@ class Swimmer:
                     f"[[effects]] {effect.kind} is asked for twice",
                     instead="keep one",
                 )
+        self._check_medium()
+
+    def _check_medium(self) -> None:
+        """Refuse a medium that is none, or that the solver or an effect does not
+        take."""
+        require_law(self.medium)
+        refuse_mutable(self.medium)
+        with located("[numerics]"):
+            record(self.medium, self.solver.loads)
+        for effect in self.effects:
             with located("[[effects]]"):
-                effect.in_body_lengths(self.body.length).check(self.medium)
+                own = effect.in_body_lengths(self.body.length)
+                for medium in members(self.medium):
+                    own.check(medium)
+
+    def in_medium(self, medium: rft.Medium) -> Swimmer:
+        """Return the swimmer in another medium, which alone is checked."""
+        new = object.__new__(type(self))
+        new.__dict__.update(self.__getstate__(), medium=medium)
+        new._check_medium()
+        return new
 
     def __getstate__(self) -> dict:
         # Without cached values.
@@ -219,9 +236,8 @@ class Swimmer:
         """Size of the balance of forces that one velocity takes."""
         solver = self.solver
         effects = self.effects
-        assembly = assemble(
-            self.medium, self.body, effects, solver.loads, solver.pieces
-        )
+        medium = members(self.medium)[0]  # whose size is that of the others
+        assembly = assemble(medium, self.body, effects, solver.loads, solver.pieces)
         pieces = 0
         if any(e.varies_along for e in effects):
             # Elements that are shorter than a piece are not cut.
@@ -233,7 +249,7 @@ class Swimmer:
             evaluations=assembly.n_law_points,
             pieces=pieces,
             memory=sum(e.memory_size for e in assembly.effects),
-            batched=any(np.ndim(value) for value in values),
+            batched=isinstance(self.medium, MediumBatch) or any(map(np.ndim, values)),
         )
 
     def with_solver(self, solver: Solver) -> Swimmer:
@@ -418,12 +434,16 @@ class Swimmer:
 
     def _for_gaits(self, count: int, phases: int) -> Swimmer:
         """Return the swimmer for ``count`` gaits of ``phases`` phases each, where
-        effects have a parameter for each gait."""
+        media, or parameters of effects, differ between gaits."""
         gaits = np.repeat(np.arange(count), phases)
+        medium = self.medium
+        if isinstance(medium, MediumBatch):
+            medium = medium.take(gaits)
         effects = tuple(e.take(gaits) for e in self.effects)
-        if all(a is b for a, b in zip(effects, self.effects)):
+        unchanged = all(a is b for a, b in zip(effects, self.effects))
+        if medium is self.medium and unchanged:
             return self
-        return dataclasses.replace(self, effects=effects)
+        return dataclasses.replace(self, medium=medium, effects=effects)
 
     def _repeats(self, steps: rft.TimeSteps) -> bool:
         """Return whether cycles are equal: the velocity is then periodic, and its

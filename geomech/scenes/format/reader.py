@@ -57,9 +57,9 @@ class Source:
         """Return a table in which the name of a file has its folder, and add the file
         to ``files``."""
         table = dict(table)
-        folder = self.folder or Path(self.name).absolute().parent
         for key in FILES:
             if isinstance(table.get(key), str):
+                folder = self.folder or Path(self.name).absolute().parent
                 table[key] = str(folder / table[key])
                 self.files.append(table[key])
         return table

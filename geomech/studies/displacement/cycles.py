@@ -15,7 +15,7 @@ from geomech.mathematics.systems.capabilities import gaits_per_batch
 from geomech.run.cost import Cost
 from geomech.scenes import write as written
 from geomech.scenes.model import Scene, checked_scene
-from geomech.studies.displacement.batch import batch_key, joined_scene
+from geomech.studies.displacement.batch import grouped, joined_scene
 from geomech.studies.displacement.variables import QUANTITIES, pose_variables
 from geomech.studies.estimates import estimate, uncertainty
 from geomech.studies.estimates.cost import direct_jobs, medium_jobs, total_cost
@@ -23,6 +23,7 @@ from geomech.studies.grid import Grid, values_at_points
 
 BYTES_PER_POINT = 200  # of its row, and of copies while it is written to a file
 SECONDS_PER_SCENE = 6e-4  # to build one from its tables; measured
+SECONDS_PER_MEDIUM = 9e-5  # to read one into a scene that is built; measured
 # Gaits of a batch: enough to fill the solver, and little is lost when a sweep stops.
 BATCH_SIZE = 64
 ROW_WIDTH = 5  # numbers of a row: x, y, theta and the errors of position and heading
@@ -78,7 +79,7 @@ class Cycles:
             memories.append(one_batch[0].memory)
 
         balances, seconds, _, besides, numpy_seconds = np.mean(costs, 0).tolist()
-        building = SECONDS_PER_SCENE * n_points
+        building = SECONDS_PER_SCENE * grid.n_scenes + SECONDS_PER_MEDIUM * n_points
         memory = max(memories) + BYTES_PER_POINT * total
         return Cost(
             round(balances),
@@ -131,8 +132,8 @@ def _mean_batch_size(grid: Grid) -> int:
     only scenes that can share a batch are solved together."""
     n_points = grid.points.total
     n_first = min(n_points, BATCH_SIZE)
-    keys = {batch_key(grid.scene_factory(grid.points[k])) for k in range(n_first)}
-    gaits = grid.total // n_points * n_first // len(keys)
+    groups = grouped([grid.scene_factory(grid.points[k]) for k in range(n_first)])
+    gaits = grid.total // n_points * n_first // len(groups)
     return max(1, min(BATCH_SIZE, gaits))
 
 
@@ -184,12 +185,8 @@ def _rows(scenes: list[Scene], amplitudes) -> list:
 def _solve_in_batches(scenes: list[Scene], amplitudes, solve: Callable) -> list:
     """Return the rows of solve(joined scene) for the scenes in their order, one for
     each amplitude of every scene."""
-    groups: dict[str, list[int]] = {}
-    for k, scene in enumerate(scenes):
-        groups.setdefault(batch_key(scene), []).append(k)
-
     rows: list = [None] * len(scenes)
-    for members in groups.values():
+    for members in grouped(scenes):
         joined = joined_scene([scenes[k] for k in members], amplitudes)
         solved = np.split(solve(joined), len(members))
         for k, part in zip(members, solved):
