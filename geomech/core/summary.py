@@ -13,6 +13,7 @@ from rft.core.premise import negation
 from rft.core.refusal import formatted
 
 WIDTH = 80  # characters of a line on a small screen
+ALIKE = 1e-9  # difference of values that are alike, over them
 
 
 def part(kind: str, thing) -> str:
@@ -112,6 +113,14 @@ def poses(values) -> str:
     """Return the ranges of x, y and theta of poses or velocities (..., 3)."""
     rows = np.asarray(values, float).reshape(-1, 3).T
     return spans(np.round(rows, 12) + 0.0)  # no -0
+
+
+def first_place(values: np.ndarray, extreme: float) -> tuple[int, ...]:
+    """Return the first place, in C order, at which an array has its extreme, but for
+    rounding, which would decide between places that are alike."""
+    is_extreme = np.abs(values - extreme) <= ALIKE * np.abs(extreme)
+    place = np.unravel_index(np.flatnonzero(is_extreme)[0], values.shape)
+    return tuple(map(int, place))
 
 
 def listed(names: Sequence[str]) -> str:

@@ -10,11 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 
-from geomech.core.summary import WIDTH, wrapped
+from geomech.core.summary import WIDTH, first_place, wrapped
 from geomech.core.variables import Result, Variable
 from geomech.results.kinds import kind_of
 from geomech.results.numbers import decimals, number, size, with_error
@@ -435,8 +434,8 @@ def extremes_at(
         cells = ["zero", "", "zero", ""]
         low = high = (0,) * values.ndim
     else:
-        low = place_in(values, np.nanargmin(values))
-        high = place_in(values, np.nanargmax(values))
+        low = first_place(values, np.nanmin(values))
+        high = first_place(values, np.nanmax(values))
         cells = []
         for where in (low, high):
             cells += [f"{values[where]:.4g}", place_words(result, grid, where)]
@@ -444,11 +443,6 @@ def extremes_at(
         errors = variable.error[place]
         cells.append(size(float(max(errors[low], errors[high]))))
     return cells
-
-
-def place_in(values: np.ndarray, number: Any) -> Places:
-    """Return the place of the entry of that number, in C order."""
-    return tuple(int(k) for k in np.unravel_index(number, values.shape))
 
 
 def place_words(result: Result, dims: Sequence[str], place: Places) -> str:

@@ -15,6 +15,7 @@ from matplotlib import pyplot
 import geomech
 import rft
 from geomech import plots
+from geomech.core import summary
 from geomech.mathematics.gaits import Ellipse
 from geomech.mathematics.geometry import connection, curvature
 from geomech.mathematics.systems import Swimmer
@@ -211,3 +212,9 @@ def test_plots_draw_where_they_stand(name, study, table):
     pyplot.sca(second)
     assert draw(study, table) is second and pyplot.gcf() is figure
     pyplot.close("all")
+
+
+def test_of_places_that_are_alike_but_for_rounding_the_first_is_named():
+    values = np.array([[0.1, 0.3], [0.3 * (1 + 1e-15), np.nan]])
+    assert summary.first_place(values, np.nanmax(values)) == (0, 1)
+    assert summary.first_place(-values, np.nanmin(-values)) == (0, 1)

@@ -197,8 +197,9 @@ def test_a_film_shows_body_track_and_shape():
     for row in (0, 20, 51):
         track, body, head, dot, _ = put(row)
         np.testing.assert_array_equal(track.get_xydata(), motion.pose[: row + 1, :2])
-        np.testing.assert_array_equal(body.get_xydata(), motion.points()[row])
-        np.testing.assert_array_equal(head.get_xydata(), motion.points()[row, -1:])
+        points = motion.points()[row]
+        np.testing.assert_allclose(body.get_xydata(), points, atol=1e-15)
+        np.testing.assert_allclose(head.get_xydata(), points[-1:], atol=1e-15)
         np.testing.assert_array_equal(dot.get_xydata(), motion.alpha[row : row + 1])
 
 

@@ -298,7 +298,8 @@ def test_a_direction_is_that_of_the_mean_heading_and_forwards(direction, stroke)
     ahead = found.best.displacement["xy".index(direction)]
     assert found.value == pytest.approx(ahead, rel=1e-5)
     xi = found.scene.system.velocity(*found.gait.cycle(found.request.phases))
-    assert turning(xi)[0] == pytest.approx(0.0, abs=1e-5)
+    # At a maximum a place is known to the root of what its value is known to.
+    assert turning(xi)[0] == pytest.approx(0.0, abs=1e-4)
     assert direction == "y" or ahead == pytest.approx(stroke.value, rel=1e-3)
 
 

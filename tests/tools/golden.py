@@ -57,7 +57,7 @@ TOLERANCE = 1e-12
 LOOSE_TOLERANCE = 1e-8
 RESIDUAL_TOLERANCE = 1e-6
 LOOSE = ("walk", "measured, log", "measured, rod", "measured, plates")
-LOOSE += ("form, optimum", "form, midlines")
+LOOSE += ("form",)
 SOLVED = {"regularisation": 1e-3, "tolerance": 1e-15}
 COARSE = {
     "regularisation": 1e-3,
@@ -305,9 +305,6 @@ FORMS = {
     "forces of a backbone": "forces bends.toml",
     "optimum, efficiency": (
         "optimize scene.toml --objective efficiency --harmonics 1 --starts 1"
-    ),
-    "optimum, turning": (
-        "optimize viscous.toml --objective turning --harmonics 2 --starts 1"
     ),
     "optimum, speed": (
         "optimize viscous.toml --objective speed --harmonics 1 --rate 3 --power 2"

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 
+from geomech.core.summary import first_place
 from geomech.core.variables import Result
 from geomech.questions.shared import loading, names
 from geomech.questions.shared.base import Question, Run, Subject
@@ -103,8 +104,8 @@ def extreme_lines(result: Result) -> list[str]:
         values = result[name].values
         unit = result[name].unit
         kind = name.partition("_")[0]
-        least = value_words(result, name, values.argmin())
-        greatest = value_words(result, name, values.argmax())
+        least = value_words(result, name, *first_place(values, values.min()))
+        greatest = value_words(result, name, *first_place(values, values.max()))
         if np.abs(values).max() < ROUNDING * largest[kind]:
             lines.append(f"{name:8} zero to rounding")
         elif np.ptp(values) < ROUNDING * largest[kind]:

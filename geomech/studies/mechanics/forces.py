@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from geomech.core.summary import first_place
 from geomech.core.variables import Result, Variable
 from geomech.mathematics.geometry.reconstruct import poses
 from geomech.mathematics.systems.base import body_size, length_unit
@@ -160,7 +161,7 @@ def largest_moment(found: Result) -> list[Variable]:
     """Return the largest bending moment, its place and its phase."""
     moment = found["bending_moment"]
     sizes = np.abs(moment.values)
-    k, point = np.unravel_index(sizes.argmax(), sizes.shape)
+    k, point = first_place(sizes, sizes.max())
     s = found["point"].values[point]
     phase = found["phase"].values[k]
     return [
