@@ -45,6 +45,8 @@ def test_nothing_changed_that_nobody_meant_to_change(part, least):
         (golden.intruders, 110),
         (golden.measurements, 105),
         (golden.forms, 450),
+        (golden.pictures, 130),
+        (golden.grains, 40),
         (golden.costs, 140),
     ],
     ids=lambda x: getattr(x, "__name__", ""),

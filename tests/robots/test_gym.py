@@ -77,6 +77,9 @@ def test_many_robots_go_as_each_alone():
     assert not cuts[:-1].any() and cuts[-1].all()
     seen, *rest, _ = many.step(actions[0])
     assert not np.any(rest) and seen[0, 0] == pytest.approx(0.09)
+    many.unwrapped.qpos[0, 3:7] = [0, 1, 0, 0]
+    falls = [many.step(0 * actions[0])[2].tolist() for _ in range(3)]
+    assert falls == [[True, False], [False, False], [False, False]]
     many.close()
 
 

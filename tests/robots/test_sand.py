@@ -238,16 +238,16 @@ def test_a_body_at_rest_creeps_as_its_sinkage_says():
 
 
 def hilly(heights, pose="", geoms=f"<geom {GEOMS[1]}/>"):
-    """A body over a height field 2 m along x and 1 m along y, of up to 1 m."""
+    """A body over a height field 2.5 m along x and 1 m along y, of up to 1 m."""
     rows = " ".join(f"{x:.12f}" for x in np.ravel(heights))
-    size = f'nrow="{len(heights)}" ncol="{len(heights[0])}" size="1 0.5 1 0.1"'
+    size = f'nrow="{len(heights)}" ncol="{len(heights[0])}" size="1.25 0.5 1 0.1"'
     asset = f'<asset><hfield name="hills" {size} elevation="{rows}"/></asset>'
     field = f'<geom name="hills" type="hfield" hfield="hills" {pose}/>'
     return model_of(field + free(geoms), AT_ONCE, asset)
 
 
-RISE = np.linspace(0.0, 1.0, 5) * np.ones((4, 1))  # by 1 m in 2 m
-# By 0.8 m in 2 m along x and 0.2 m in 1 m along y; rows of MJCF run down along y.
+RISE = np.linspace(0.0, 1.0, 5) * np.ones((4, 1))  # by 1 m in 2.5 m
+# By 0.8 m in 2.5 m along x and 0.2 m in 1 m along y; rows of MJCF run down along y.
 OBLIQUE = np.linspace(0.0, 0.8, 5) + np.linspace(0.2, 0.0, 4)[:, None]
 
 
@@ -257,7 +257,7 @@ def test_a_height_field_is_the_surface(solved_by):
     flat = model_of(free(f"<geom {GEOMS[1]}/>"), AT_ONCE)
     roll = Rotation.from_euler("x", 0.4)
     yaw = Rotation.from_euler("z", 30, degrees=True)
-    uphill = Rotation.from_euler("z", math.radians(30) + math.atan2(0.2, 0.4))
+    uphill = Rotation.from_euler("z", math.radians(30) + math.atan2(0.2, 0.32))
     straight = Rotation.identity()
 
     def force(model, turn, place, **options):
@@ -270,7 +270,7 @@ def test_a_height_field_is_the_surface(solved_by):
         assert data.ncon == 0
         return turn.inv().apply(found)
 
-    angle = math.atan(math.hypot(0.4, 0.2))
+    angle = math.atan(math.hypot(0.32, 0.2))
     expected = force(flat, straight, [0.2, 0.1, 0.11], slope=angle) / math.cos(angle)
     assert np.linalg.norm(expected) > 1.0
     found = force(hilly(OBLIQUE, place), uphill, [0.2, 0.1, 0.11], level="hills")

@@ -16,12 +16,15 @@ smallest tolerance there is: along another path all come out within 6e-13. Only 
 contain the residual, which is rounding.
 """
 
+import contextlib
 import itertools
 import json
 import pathlib
 import re
 import sys
+import warnings
 
+import beds
 import frozen
 import numpy as np
 import pytest
@@ -57,7 +60,7 @@ TOLERANCE = 1e-12
 LOOSE_TOLERANCE = 1e-8
 RESIDUAL_TOLERANCE = 1e-6
 LOOSE = ("walk", "measured, log", "measured, rod", "measured, plates")
-LOOSE += ("form",)
+LOOSE += ("form", "picture", "grains")
 SOLVED = {"regularisation": 1e-3, "tolerance": 1e-15}
 COARSE = {
     "regularisation": 1e-3,
@@ -320,20 +323,125 @@ FORMS = {
 }
 
 
-def forms():
-    """Questions in the forms that other entries leave out: slices, metrics, frames,
-    other objectives, settings of each kind of scene."""
+@contextlib.contextmanager
+def scene_files():
+    """A copy of data/frozen with the scenes of `forms` and `pictures`."""
     viscous = geomech.load("three-link-viscous").text + "\n[numerics]\nphases = 32\n"
     with frozen.place() as here:
         (here / "scene.toml").write_text(SCENE)
         (here / "framed.toml").write_text(FRAMED)
         (here / "paced.toml").write_text(PACED)
         (here / "viscous.toml").write_text(f"{viscous}grid = 9\nharmonics = 5\n")
+        yield
+
+
+def forms():
+    """Questions in the forms that other entries leave out: slices, metrics, frames,
+    other objectives, settings of each kind of scene."""
+    with scene_files():
         for name, line in FORMS.items():
             yield from printed(f"form, {name}", *line.split())
         for name in ("four", "table"):
             everything = geomech.study(f"{name}.toml").run()
             yield from of_result(f"form, all of {name}", everything)
+
+
+def grains():
+    """Runs of bodies that obey a law, in place of those of LAMMPS."""
+    with scene_files(), pytest.MonkeyPatch.context() as patch:
+        beds.obey(patch)
+        swim = geomech.study("scene.toml").grains(cycles=2, store="swim")
+        yield from of_result("grains, swim", swim)
+        angles = (0.0, 20.0, 60.0, 90.0)
+        drag = geomech.drag_grains(angles=angles, beds=2, store="drag")
+        yield from of_result("grains, drag", drag)
+
+
+# A question, its subject, its fields, and options of its picture.
+PICTURES = {
+    "ccf": ("ccf", "scene.toml", {}, {}),
+    "ccf, contours": ("ccf", "scene.toml", {}, {"style": "contours"}),
+    "ccf, one": ("ccf", "viscous.toml", {}, {"component": "theta", "clim": 0.1}),
+    "ccf, metric": ("ccf", "viscous.toml", {"metric": True}, {}),
+    "ccf, stretched": ("ccf", "viscous.toml", {"stretched": True}, {"stretch": True}),
+    "ccf, frames": ("ccf", "scene.toml", {"compare_frame": "link-2"}, {}),
+    "ccf, slices": ("ccf", "four.toml", {}, {}),
+    "ccf, slices in frames": (
+        "ccf",
+        "four.toml",
+        {"pair": "1,3", "compare_frame": "link-1"},
+        {"clim": "90%"},
+    ),
+    "connection": ("connection", "scene.toml", {}, {"component": ("y", "x")}),
+    "connection, frames": (
+        "connection",
+        "scene.toml",
+        {"compare_frame": "link-2"},
+        {"clim": "95%"},
+    ),
+    "connection, slice": ("connection", "four.toml", {"pair": "2,3"}, {}),
+    "displacement": ("displacement", "scene.toml", {"amplitudes": (0.5, 1.0)}, {}),
+    "displacement, data": (
+        "displacement",
+        "plain.toml",
+        {"amplitudes": (0.5, 1.0), "tiers": ("path", "direct")},
+        {"component": "x", "data": "moved.csv"},
+    ),
+    "optimum": ("optimize", "viscous.toml", {"harmonics": 1, "starts": 1}, {}),
+    "forces": (
+        "forces",
+        "paced.toml",
+        {},
+        {"component": ("normal", "moment"), "clim": "90%"},
+    ),
+    "trajectory": ("trajectory", "scene.toml", {"cycles": 2}, {}),
+    "sweep": ("sweep", "scene.toml", {"over": {"gait.amplitude": [0.3, 0.8]}}, {}),
+    "sweep of two": (
+        "sweep",
+        "paced.toml",
+        {"over": {"gait.amplitude": [0.3, 0.8], "medium.C": [1.0, 2.0]}},
+        {},
+    ),
+    "walk": ("walk", "walk.toml", {}, {}),
+    "strip": ("walk", "walk.toml", {}, {"strip": True}),
+    "intrude": ("intrude", "leg.toml", {}, {}),
+    "intrude, solid": ("intrude", "wedge.toml", {}, {}),
+    "rod": ("fit_medium", "rod.csv", {}, {}),
+    "plates": ("fit_medium", "plates.csv", {}, {}),
+    "push": ("fit_medium", "push.csv", {}, {}),
+    "log": ("fit_gait", "log.csv", {"harmonics": 1}, {}),
+    "trial": ("fit_gait", "trial.csv", {"medium": "glass-0.3mm-close"}, {}),
+}
+
+
+def drawn(axes) -> list[float]:
+    """Return the data of an Axes' lines and collections in few numbers."""
+    numbers: list[float] = []
+    for line in axes.lines:
+        numbers += digest(line.get_xydata())
+    for collection in axes.collections:
+        vertices = [path.vertices for path in collection.get_paths()]
+        numbers += digest(np.concatenate([np.zeros((0, 2)), *vertices]))
+        numbers += digest(np.ma.filled(collection.get_offsets(), np.nan))
+        if collection.get_array() is not None:
+            numbers += digest(np.ma.filled(collection.get_array(), np.nan))
+    return numbers
+
+
+def pictures():
+    """What every question draws."""
+    with scene_files(), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for name, (question, subject, fields, options) in PICTURES.items():
+            about = geomech
+            given = [subject]
+            if subject.endswith(".toml"):
+                about = geomech.study(subject)
+                given = []
+            result = getattr(about, question)(*given, **fields)
+            figure = result.plot(**options)
+            for k, axes in enumerate(figure.axes):
+                yield f"picture, {name}, axes {k + 1}", drawn(axes)
 
 
 # Lines whose costs are known in some hundredths of a second, by what they are about.
@@ -397,6 +505,8 @@ PARTS = {
     walkers: ("walker",),
     measurements: ("measured",),
     forms: ("form",),
+    pictures: ("picture",),
+    grains: ("grains",),
     costs: ("cost",),
 }
 
