@@ -8,7 +8,7 @@ collected by pytest:
 
 The first line runs the suite and the examples of docstrings once and notes which
 functions each test calls, and its seconds. A mutant then meets the tests that call the
-function in which it stands (of a constant: any of its class, file or folder), quickest
+function in which it stands (of a constant: any of its class, file or folder, in files that name it first), quickest
 first, and as far as `--enough` seconds go, the rest of their files, which may look at
 what a fixture or a cache holds. Tests deleted since the measurement are left out; of
 tests added since nothing is known. `mutants.toml` beside this file names the tests of what
@@ -37,6 +37,7 @@ import itertools
 import json
 import os
 import random
+import re
 import resource
 import shutil
 import signal
@@ -274,7 +275,14 @@ class Watch:
             near = next((self.calling[x] for x in places if x in self.calling), set())
         files = {file_of(test) for test in near}
         every = [test for test in self.seconds if file_of(test) in files]
-        every.sort(key=lambda test: (test not in near, self.seconds[test]))
+        naming = files_that_name(m)
+        every.sort(
+            key=lambda test: (
+                test not in near,
+                test.partition("::")[0] not in naming,
+                self.seconds[test],
+            )
+        )
         some = []
         sums = collections.Counter()
         for test in every:
@@ -282,6 +290,17 @@ class Watch:
                 some.append(test)
                 sums[file_of(test)] += self.seconds[test]
         return sorted(some, key=lambda test: (sums[file_of(test)], file_of(test)))
+
+
+def files_that_name(m: Mutant) -> set[str]:
+    """The files of tests that have the name of the constant that a mutant changes; none
+    of a mutant within a function."""
+    target = re.match(r"- (\w+)(?: *:[^=]*)? = ", m.change())
+    if m.scope or not target:
+        return set()
+    name = re.compile(rf"\b{target[1]}\b")
+    files = (ROOT / "tests").rglob("test_*.py")
+    return {str(x.relative_to(ROOT)) for x in files if name.search(x.read_text())}
 
 
 def file_of(test: str) -> str:
