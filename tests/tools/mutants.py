@@ -8,10 +8,10 @@ collected by pytest:
 
 The first line runs the suite and the examples of docstrings once and notes which
 functions each test calls, and its seconds. A mutant then meets the tests that call the
-function in which it stands (of a constant: any of its class, file or folder, in files that name it first), quickest
-first, and as far as `--enough` seconds go, the rest of their files, which may look at
-what a fixture or a cache holds. Tests deleted since the measurement are left out; of
-tests added since nothing is known. `mutants.toml` beside this file names the tests of what
+function in which it stands (of a constant: any of its class, file or folder, those in
+files that name it first), quickest first, and as far as `--enough` seconds go, the rest
+of their files, which may look at what a fixture or a cache holds. Tests deleted since
+the measurement are left out; of tests added since nothing is known. `mutants.toml` beside this file names the tests of what
 Python does not see called, what is left out and which mutants are no bugs. Mutants live
 in copies of the tree in the system's temporary folder, one a worker; the checkout is
 only read. A mutant is killed when a test fails; time-outs, far longer than without it,
