@@ -13,11 +13,13 @@ from figures.grains import plates as plates_figure
 from figures.grains.campaigns import grains as campaign
 from figures.paper.fig08a_rods import face_stress
 from geomech import scenes
+from geomech.core.variables import Variable
 from geomech.questions.grains.drag_grains import DragGrains
 from geomech.questions.grains.grains import Grains
 from geomech.questions.measured.fit_medium import FitMedium
 from geomech.scenes.data import drag
 from geomech.studies.grains import swim as grain_swim
+from geomech.studies.grains.drag import mean_over_beds
 from geomech.studies.scene_tables import SceneTables
 from geomech.studies.terradynamics.calibration import rod_fit
 from rft import EndCaps, Granular
@@ -40,6 +42,22 @@ def ends():
     """Return forces (2, N), N, on both ends of the rod."""
     caps = EndCaps(ROD.radius / ROD.length, head=1.7, tail=0.0, across=0.8)
     return 0.4 * np.array(caps.traction(LAW, *WAY))
+
+
+@pytest.mark.parametrize("beds_drawn", [1, 3])
+def test_the_error_of_a_mean_over_beds_is_that_of_its_scatter_or_of_the_one_bed(
+    beds_drawn,
+):
+    values = np.random.default_rng(1).normal(size=(2, beds_drawn, 4))
+    dims = ("component", "bed", "attack_angle")
+    drags = Variable("flank", dims, values, "N/m", error=0.1 + 0 * values)
+    found = mean_over_beds(drags)
+    np.testing.assert_allclose(found.values, values.sum(1) / beds_drawn)
+    errors = np.full((2, 4), 0.1)
+    if beds_drawn == 3:
+        a, b, c = np.moveaxis(values, 1, 0)
+        errors = np.sqrt(((a - b) ** 2 + (b - c) ** 2 + (c - a) ** 2) / 18)
+    np.testing.assert_allclose(found.error, errors)
 
 
 def test_flank_and_ends_give_the_law_and_its_caps():

@@ -118,6 +118,10 @@ def test_a_plane_is_that_of_the_whole_field_in_sand(at):
     np.testing.assert_allclose(cut.connection.A, A, atol=1e-9)
     residual = fitted.residual[..., k, :]
     np.testing.assert_allclose(cut.connection.residual, residual, atol=1e-9)
+    looked_up = interpolated_plane(fitted, (0, 2), at).connection
+    for name in ("A", "residual", "speed"):
+        found, same = getattr(looked_up, name), getattr(cut.connection, name)
+        np.testing.assert_allclose(found, same, atol=1e-9, err_msg=name)
 
 
 def test_many_joints_have_planes_and_no_field():

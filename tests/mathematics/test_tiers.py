@@ -290,6 +290,16 @@ def test_a_table_pays_for_many_amplitudes_and_not_for_few(count, tier):
     assert tabled(found)["tier"] == tier
 
 
+def test_a_tolerance_refines_pieces():
+    uneven = GLASS.changed(effects=(DepthProfile((1.0, 0.5)),))
+    found = cheapest_displacements(uneven.with_numerics(pieces=2), [0.5], 1e-4)
+    assert found["chosen_pieces"].values > 2
+    fine = uneven.with_numerics(pieces=64)
+    true, _ = estimate.direct(fine, uneven.gait, np.array([0.5]), 128)
+    off = estimate.pose_distance(np.array(tabled(found)["direct"]), true, 1.0)
+    assert off[0, 0] < 1e-4
+
+
 # Amplitudes of either sign.
 
 GENERIC = Fourier(

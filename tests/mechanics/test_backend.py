@@ -370,6 +370,28 @@ def test_the_same_states(name):
 
 
 @compiled
+@pytest.mark.parametrize("spoilt", [None, 0.0, np.nan])
+def test_both_solve_four_equations_and_nothing_where_one_tells_nothing(spoilt):
+    from rft.balance import walks
+
+    rng = np.random.default_rng(2)
+    matrix = rng.normal(size=(4, 4, 8))
+    matrix[0, :2, :4] = 0.0
+    right = rng.normal(size=(4, 8))
+    expected = np.linalg.solve(matrix.transpose(2, 0, 1), right.T[..., None])[..., 0].T
+    if spoilt is not None:
+        matrix[rng.integers(4, size=8), :, np.arange(8)] = spoilt
+        expected[:] = np.nan
+    found = np.ones((4, 8))
+    for k in range(8):
+        walks.solve4(matrix[..., k], right[:, k], np.empty((4, 5)), found[:, k])
+    np.testing.assert_allclose(found, expected, rtol=1e-11)
+    with np.errstate(all="ignore"):  # as in a descent
+        by_numpy = path.solve4(matrix, right[:, None])[:, 0]
+    np.testing.assert_allclose(by_numpy, expected, rtol=1e-11)
+
+
+@compiled
 def test_eight_exponential_functions():
     from numba import njit
 

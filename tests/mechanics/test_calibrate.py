@@ -204,6 +204,7 @@ def test_end_caps():
     [
         ("granular", Coulomb(), PSI, "edge of C, 0"),
         ("granular", Viscous(3.0), PSI, "edge of|apart|settle"),
+        ("granular", Granular(1.8, 5e-4), PSI, "edge of gamma0"),
         (
             "granular",
             Granular(1.8, 0.24),

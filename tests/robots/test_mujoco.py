@@ -284,3 +284,18 @@ def test_a_hull_is_a_box_that_pitches_as_its_robot_is_told():
     model = mujoco.MjModel.from_xml_string(hexapod.mjcf(robot))
     sides = 2 * model.geom_size[model.geom_bodyid == 1]
     np.testing.assert_allclose(sides, [[0.15, 0.06, 0.03]])
+
+
+@pytest.mark.parametrize(
+    "robot",
+    [
+        Rhex(0.2, 0.15, 0.03, 0.06, CLeg(0.025, 0.012), (-0.05, 0.06), inertia=5e-4),
+        XPLORER.robot,
+    ],
+)
+def test_legs_turn_as_rods_about_their_ends_and_weigh_what_the_hull_lacks(robot):
+    model = mujoco.MjModel.from_xml_string(hexapod.mjcf(robot))
+    reach = np.abs(robot.leg(12).points).max()
+    legs = model.body_mass[2:, None] * reach**2 / 3
+    np.testing.assert_allclose(model.body_inertia[2:], legs + [0, 0, 0])
+    assert model.body_mass.sum() == pytest.approx(robot.mass)

@@ -35,6 +35,7 @@ from rft.terradynamics.plates.stress import COEFFICIENTS
 mujoco = pytest.importorskip(
     "mujoco", reason="needs the extra: pip install 'geomech[mujoco]'"
 )
+from rft.mujoco.ground.selection import overlap_note  # noqa: E402
 from rft.mujoco.media import law_of  # noqa: E402
 from rft.mujoco.sand import meshes  # noqa: E402
 from rft.terradynamics.meshes.geoms import mesh_of_elements  # noqa: E402
@@ -648,6 +649,19 @@ def test_geoms_in_the_sand_touch_no_floor_and_everything_else(options, touched):
         left = {tuple(sorted(("floor", name))) for name in touched}
         assert touching(model) == {("rock", "stone")} | left
     assert touching(model) == before
+
+
+@pytest.mark.parametrize(
+    ("depth", "bodies", "told"),
+    [(-0.03, 1, 0), (0.0, 1, 0), (0.03, 1, 0), (0.07, 1, 1), (0.5, 1, 1), (0.5, 2, 0)],
+)
+def test_geoms_of_one_body_that_overlap_are_told(depth, bodies, told):
+    """From a twentieth of the smaller one's radius on."""
+    other = f'<geom type="sphere" size="0.02" pos="{0.06 - 0.02 * depth} 0 0"/>'
+    if bodies == 2:
+        other = f"<body>{other}</body>"
+    model = model_of(free(f'<geom type="sphere" size="0.04"/>{other}'))
+    assert bool(overlap_note(model, range(model.ngeom))) == told
 
 
 def test_sands_of_one_model_come_and_go_in_any_order():

@@ -20,14 +20,14 @@ from commands import geomech as run_geomech
 from scipy.io import netcdf_file
 
 import geomech
-from geomech import questions
+from geomech import plots, questions
 from geomech.core.variables import Result, Variable
 from geomech.io import results as io
 from geomech.questions.shared import base
 from geomech.results import files
 from geomech.run.digest import digest
 from geomech.shell import cli
-from geomech.shell.command import declaration, parameters
+from geomech.shell.command import declaration, figure, parameters
 from rft.core.refusal import Refusal
 
 FIELD = {"grid": 9, "phases": 32}
@@ -256,8 +256,8 @@ def test_a_picture_of_a_file_is_that_of_the_result(result, tmp_path):
             np.testing.assert_array_equal(a.get_xydata(), b.get_xydata())
 
 
-def test_every_switch_of_a_picture_draws_or_is_refused(result):
-    """These results have no stretched shape space."""
+def test_every_switch_of_a_picture_draws_or_is_refused(result, tmp_path):
+    """The command writes what it draws. These results have no stretched shape space."""
     if result.question.draw is None:
         pytest.skip("there is none")
     for name, (_, kind, _) in declaration(type(result.question)).picture.items():
@@ -265,7 +265,12 @@ def test_every_switch_of_a_picture_draws_or_is_refused(result):
             with pytest.raises(Refusal, match="was not computed"):
                 result.plot(stretch=True)
         elif kind is bool:
-            assert result.plot(**{name: True}).axes, name
+            drawn = result.plot(**{name: True})
+            assert drawn.axes, name
+            plots.save(drawn, tmp_path / "drawn.png")
+            figure(tmp_path / "a.png", {name: True}).write(result, tmp_path / "a.png")
+            pictures = [(tmp_path / f).read_bytes() for f in ("a.png", "drawn.png")]
+            assert pictures[0] == pictures[1], name
 
 
 def test_a_method_of_a_study_asks_the_same(form, asked, result):

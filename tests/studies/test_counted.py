@@ -10,6 +10,7 @@ import pytest
 from geomech import scenes
 from geomech.mathematics.gaits import Fourier, Wave
 from geomech.mathematics.systems import Swimmer
+from geomech.mathematics.tiers import TIERS
 from geomech.questions.swimmers.accuracy import Accuracy
 from geomech.questions.swimmers.ccf import Ccf
 from geomech.questions.swimmers.run import Run
@@ -97,6 +98,17 @@ def test_tiers_take_the_balances_foretold(name, solved):
     foretold = SceneTables(scene).cost([0.1, 0.2, 0.3], tiers).balances
     SceneTables(scene).displacements([0.1, 0.2, 0.3], tiers)
     assert foretold == sum(solved)
+
+
+@pytest.mark.parametrize("tier", TIERS)
+@pytest.mark.parametrize("scene", [GLASS, VISCOUS, SKIN])
+def test_a_plan_takes_its_balances(scene, tier, solved):
+    tables = SceneTables(scene.with_numerics(grid=7, phases=32))
+    amplitudes = np.array([0.2, 0.3])
+    plan = tables.plan(tier, amplitudes=amplitudes)
+    solved.clear()
+    tables.poses(tier, amplitudes=amplitudes)
+    assert cost.n_balances(plan, 2, 32) == sum(solved)
 
 
 @pytest.mark.parametrize("scene", [GLASS, SKIN, STEPS])

@@ -2,9 +2,11 @@
 
 import dataclasses
 import itertools
+import sys
 
 import numpy as np
 import pytest
+import scipy.optimize
 
 import geomech
 from geomech import plots
@@ -25,7 +27,7 @@ from geomech.studies.optimisation.evaluate import evaluate_gait
 from geomech.studies.optimisation.limiting import limiting
 from geomech.studies.optimisation.local.ascent import ascend
 from geomech.studies.optimisation.local.objectives import Objective
-from geomech.studies.optimisation.local.problem import Problem
+from geomech.studies.optimisation.local.problem import Problem, is_feasible
 from geomech.studies.optimisation.local.stroke import Stroke
 from geomech.studies.optimisation.loops import Loops
 from geomech.studies.optimisation.optimum import Optimum
@@ -281,6 +283,59 @@ def test_never_worse_than_the_start():
     # None of the start's own harmonics are cut, though the search has fewer.
     cycle = poor.start.gait.cycle(64)[0]
     assert cycle == pytest.approx(butterfly.cycle(64)[0], abs=1e-9)
+
+
+def test_a_start_that_stays_is_the_shortest_series_that_it_is(stroke):
+    """No ellipse moves as far as the best stroke."""
+    numbers = {"cos": stroke.gait.cos, "sin": stroke.gait.sin}
+    padded = {k: np.pad(x, [(0, 0), (0, 30)]) for k, x in numbers.items()}
+    gait = Fourier(**padded, centre=stroke.gait.centre)
+    kept = optimise(viscous(gait=gait), "displacement", harmonics=1, starts=1)
+    assert kept.value == kept.start.value == pytest.approx(stroke.value, rel=1e-6)
+    assert np.shape(kept.gait.cos) == (2, 16)
+
+
+def test_all_cycles_of_a_search_are_counted(monkeypatch):
+    counted = []
+
+    def watch(owner, name):
+        call = getattr(owner, name)
+
+        def counting(*arguments):
+            counted.append(name)
+            return call(*arguments)
+
+        monkeypatch.setattr(owner, name, counting)
+
+    watch(Phases, "__call__")
+    watch(sys.modules["geomech.studies.optimisation.search"], "evaluate_gait")
+    found = optimise(viscous(), "speed", harmonics=2, limits=1.4, starts=2)
+    assert found.evaluations == len(counted)
+
+
+def test_an_ascent_takes_the_steps_it_is_given(monkeypatch):
+    steps = []
+    original = scipy.optimize.minimize
+
+    def minimise(*arguments, **options):
+        solution = original(*arguments, **options)
+        steps.append(solution.nit)
+        return solution
+
+    monkeypatch.setattr("scipy.optimize.minimize", minimise)
+    loops, p = some_loop()
+    cycles = Phases(loops, Swimmer(FLUID, ODD).velocity)
+    ascend(cycles, Objective("displacement"), p, max_steps=70, tolerance=0.0)
+    assert len(steps) > 1 and sum(steps) == 70
+
+
+@pytest.mark.parametrize(
+    ("kind", "values", "feasible"),
+    [("ineq", [0.3, 0.0], 1), ("ineq", [0.3, -0.3], 0), ("eq", [0.0, 0.0], 1), ("eq", [0.0, 0.3], 0), ("eq", [-0.3, 0.0], 0)],
+)  # fmt: skip
+def test_a_constraint_is_met_from_one_side_or_from_both(kind, values, feasible):
+    rule = {"type": kind, "fun": lambda x: np.array(values)}
+    assert is_feasible(rule, np.zeros(2)) == feasible
 
 
 def test_turning():

@@ -13,6 +13,7 @@ from rft.core.refusal import Refusal
 from rft.terradynamics.meshes import Mesh, MeshFile, Spatial, read, wrench
 from rft.terradynamics.meshes.geoms import mesh_of_elements
 from rft.terradynamics.meshes.surfaces import shapes
+from rft.terradynamics.meshes.surfaces.merged import resize_faces
 from rft.terradynamics.meshes.surfaces.sound import sound
 
 BALL = shapes.sphere(0.02, 2)
@@ -138,6 +139,17 @@ def test_triangles_without_area_are_merged_with_others(k):
     assert notes == ("1 triangle without area merged with others",)
     assert (len(mesh.faces), mesh.areas.min() > 1e-5) == (len(faces), True)
     assert force(mesh) == pytest.approx(force(CUBE), rel=1e-9)
+
+
+@pytest.mark.parametrize("length", [0.002, 0.03])
+@pytest.mark.parametrize("mesh", [BALL, CUBE, BAR])
+def test_faces_of_another_size_enclose_the_same(mesh, length):
+    """Their area vectors sum to 0, and point outwards."""
+    resized = resize_faces(mesh, length, 10**5)
+    areas = resized.areas[:, None] * resized.middle_normals
+    assert np.abs(areas.sum(0)).max() < 1e-9 * mesh.areas.sum()
+    volume = (areas * resized.middles).sum() / 3
+    assert volume == pytest.approx(mesh.volume, rel=1e-9)
 
 
 @pytest.mark.parametrize(

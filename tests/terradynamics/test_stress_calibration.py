@@ -266,6 +266,7 @@ HEADS = {
     "# area = 9.5e-4\ndepth,force\n2,3": (2, 3, 9.5e-4),
     "# a plate of 3.8 cm x 2.5 cm\ndepth,force\n2,3": (2, 3, 9.5e-4),
     "# Area (cm^2): 9.5; plate 38 by 25 mm\ndepth,force\n2,3": (2, 3, 9.5e-4),
+    "# plate diameter 4 cm\ndepth,force\n2,3": (2, 3, 4e-4 * np.pi),
 }
 
 

@@ -4,6 +4,7 @@ limit cycles, ends, errors."""
 import dataclasses
 import itertools
 import math
+import types
 
 import numpy as np
 import pytest
@@ -29,7 +30,11 @@ from rft.terradynamics.walking import (
     rolling,
 )
 from rft.terradynamics.walking.planar.equations import State
-from rft.terradynamics.walking.planar.limit import Limit, limit_cycles
+from rft.terradynamics.walking.planar.limit import (
+    Limit,
+    limit_cycles,
+    predicted_progress,
+)
 from rft.terradynamics.walking.planar.march import march, step
 from rft.terradynamics.walking.planar.stride import (
     cycles_to_settle,
@@ -141,6 +146,16 @@ def test_the_limit_cycle_is_that_of_many_strides():
 )
 def test_a_walk_has_settled_once_all_cycles_are_near_the_limit(progress, limit, cycles):
     assert cycles_to_settle(progress, limit) == cycles
+
+
+@pytest.mark.parametrize("period", [1, 2])
+def test_slopes_foretell_a_thousand_cycles_of_strides(period):
+    """Of a map that halves a deviation, with each of its periods."""
+    strides = types.SimpleNamespace(cycle=2, scaled_state=lambda x, robots: x[:, None])
+    limit = Limit(np.ones(1), period, np.array([[0.5]]), np.array([0.3]))
+    moves = predicted_progress(strides, limit, np.array([1.4]), 0, 0.2)
+    maps = np.arange(2000) // period
+    np.testing.assert_allclose(moves, 0.2 + 0.12 * 0.5**maps / period, rtol=1e-12)
 
 
 def test_cost_of_transport_is_work_over_weight_times_way_along_an_arc_too():

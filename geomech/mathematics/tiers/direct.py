@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -51,17 +50,10 @@ def direct_plan(system, numerics, gait: Gait) -> Plan:
     def predict(table, amplitudes):
         return direct(system.velocity, gait, amplitudes, numerics.phases)
 
-    return Plan(predict, balances=_balances(system, gait), exact=True)
-
-
-def _balances(system, gait: Gait) -> Callable[[int, int], int]:
-    """Return the function of `Plan.balances`: each phase takes one, or follows by
-    symmetry."""
-
     def balances(count, phases):
-        return count * solved_phases(system, gait, phases)
+        return count * phases
 
-    return balances
+    return Plan(predict, balances=balances, exact=True)
 
 
 def _plan(system, numerics, gait: Gait, amplitudes) -> Plan:
@@ -78,7 +70,10 @@ def _plan(system, numerics, gait: Gait, amplitudes) -> Plan:
             return run(None)
         return in_groups(run, amplitudes, gaits_per_batch(system, phases))
 
-    return Plan(predict, balances=_balances(system, gait), exact=True)
+    def balances(count, phases):
+        return count * solved_phases(system, gait, phases)
+
+    return Plan(predict, balances=balances, exact=True)
 
 
 DIRECT = Tier(
