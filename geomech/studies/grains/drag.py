@@ -78,6 +78,8 @@ def store_folder(given: Path | None) -> Path:
     """Return the folder of settled beds and runs: the one given, else that in the
     user's cache folder."""
     if given is not None:
+        if not isinstance(given, (str, Path)):
+            raise Refusal("``store`` must be the name of a folder", value=given)
         return Path(given)
     folder = cache_folder()
     if folder is None:
