@@ -190,7 +190,11 @@ class Study:
     def tables(self) -> SceneTables:
         """What is computed of the scene: connection, CCF, metric, poses by tier."""
         if self._tables is None:
-            raise Refusal("this scene has no shape space", where=self.scene.name)
+            raise Refusal(
+                "this scene has no shape space",
+                where=self.scene.name,
+                instead="give one of a body that swims, with a [gait]",
+            )
         return self._tables
 
     displacement = method(Displacement)

@@ -27,6 +27,11 @@ def best_scene(result: Result) -> Any:
     >>> geomech.best_scene(best).gait.harmonics
     1
     """
+    if "best_scene_toml" not in result.attributes:
+        raise Refusal(
+            "this result has no best scene",
+            instead="give one of ``optimize``, of a scene that a file can hold",
+        )
     return _parsed(result, "best_scene_toml")
 
 

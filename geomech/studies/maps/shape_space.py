@@ -169,7 +169,11 @@ class Plan:
             if self.metric:
                 reason = why_no_metric(system)
                 if reason:
-                    raise Refusal(reason, where=self.scene.name)
+                    raise Refusal(
+                        reason,
+                        where=self.scene.name,
+                        instead="drop ``metric`` and ``stretch``",
+                    )
             if self.other_frame is not None and len(self.pairs_and_origins) > 1:
                 raise Refusal(
                     "``compare_frame`` draws one pair of joints",
