@@ -16,6 +16,7 @@ from geomech.questions.grains.grains import Grains
 from geomech.questions.measured.fit_gait import FitGait
 from geomech.questions.measured.fit_medium import FitMedium
 from geomech.questions.shared.base import Question, options, plain_type, subject_field
+from geomech.questions.shared.loading import REQUIRED
 from geomech.questions.shared.tools import is_film
 from geomech.questions.swimmers.accuracy import Accuracy
 from geomech.questions.swimmers.ccf import Ccf
@@ -45,6 +46,7 @@ def method(
 
     def ask(self: Study, *values: Fields.args, **options: Fields.kwargs) -> Result:
         refuse_unknown(question, options)
+        refuse_kind(question, self.scene)
         return question(self.scene, *values, **options).ask(self._tables)
 
     describe(ask, question, "self")
@@ -59,7 +61,9 @@ def function_of_scene(
 
     def ask(scene: Any, *values: Fields.args, **options: Fields.kwargs) -> Result:
         refuse_unknown(question, options)
-        return question(as_scene(scene), *values, **options).ask()
+        scene = as_scene(scene)
+        refuse_kind(question, scene)
+        return question(scene, *values, **options).ask()
 
     describe(ask, question, "scene")
     return ask
@@ -127,6 +131,13 @@ def option_names(question: Any) -> list[str]:
     return [name for name in names if name != subject]
 
 
+def refuse_kind(question: Any, scene: Any) -> None:
+    """Refuse a scene of a kind that a question is not about."""
+    _, subject = subject_field(question)
+    if subject is not None and subject.load in REQUIRED:
+        REQUIRED[subject.load](scene)
+
+
 def refuse_unknown(question: Any, given: dict[str, Any]) -> None:
     """Refuse keywords that are no fields of a question, with the nearest that is."""
     names = option_names(question)
@@ -190,7 +201,11 @@ class Study:
     def tables(self) -> SceneTables:
         """What is computed of the scene: connection, CCF, metric, poses by tier."""
         if self._tables is None:
-            raise Refusal("this scene has no shape space", where=self.scene.name)
+            raise Refusal(
+                "this scene has no shape space",
+                where=self.scene.name,
+                instead="give one of a body that swims, with a [gait]",
+            )
         return self._tables
 
     displacement = method(Displacement)

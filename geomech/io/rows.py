@@ -458,6 +458,8 @@ def read(
     """Return the table in a text file of at most ``largest`` bytes. Refusal if it is
     none. what: the cure of that refusal, the columns that the file should have.
     most_lines: from the top of the file, by default all."""
+    if not isinstance(path, (str, Path)):
+        raise Refusal("a table must be the name of a file", value=path)
     name = Path(path).name
     try:
         raw = files.read(path, largest)

@@ -112,6 +112,8 @@ def save(result: Result, path: Path, **options: Any) -> None:
 def load(path: str | Path) -> Result:
     """Return the result in a file: of .nc, .json and .mat as it was written, of .csv
     the columns. Refusal for another ending, or a file without a result."""
+    if not isinstance(path, (str, Path)):
+        raise Refusal("a result must be the name of its file", value=path)
     path = Path(path)
     if path.suffix.lower() not in READERS:
         raise Refusal(
@@ -123,6 +125,11 @@ def load(path: str | Path) -> Result:
     except OSError:
         raise
     except Exception as error:  # a damaged file raises whatever comes first
+        reason = str(error)
+        if isinstance(error, KeyError):
+            reason = f"it has no {reason}"
         raise Refusal(
-            f"{path} holds no result", because=str(error), instead="write it anew"
+            f"{path} holds no result",
+            because=reason,
+            instead="give a file of a result",
         ) from None

@@ -9,6 +9,7 @@ from typing import Any
 from geomech.core.variables import Result
 from geomech.mathematics.gaits import Fourier
 from geomech.mathematics.geometry.representations.tube import Loop, TaylorSeries
+from geomech.results.scenes import require_result
 from geomech.scenes.write import gait_table, table
 from rft.core.refusal import Refusal
 
@@ -78,6 +79,7 @@ def scene_text(result: Result, field: Path, scene: Path) -> str:
 
 def _refuse_other(result: Result) -> None:
     """Refuse a result that is not of a log of joint angles."""
+    require_result(result)
     if "gait" not in result or "gait_A" not in result:
         raise Refusal(
             "this result has no mean gait",

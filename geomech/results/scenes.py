@@ -27,6 +27,12 @@ def best_scene(result: Result) -> Any:
     >>> geomech.best_scene(best).gait.harmonics
     1
     """
+    require_result(result)
+    if "best_scene_toml" not in result.attributes:
+        raise Refusal(
+            "this result has no best scene",
+            instead="give one of ``optimize``, of a scene that a file can hold",
+        )
     return _parsed(result, "best_scene_toml")
 
 
@@ -45,9 +51,19 @@ def fitted_medium(result: Result) -> Any:
     >>> moved["net_distance"].values.round(3)
     array([[0.05]])
     """
+    require_result(result)
     if "medium_toml" not in result.attributes:
         raise Refusal("this result has no medium", instead="give one of ``fit_medium``")
     return medium_in(result.attributes["medium_toml"])
+
+
+def require_result(result: object) -> None:
+    """Refuse what is no result, such as the name of its file."""
+    if not isinstance(result, Result):
+        raise Refusal(
+            "the result must be one of a question, or of load_result(FILE)",
+            value=result,
+        )
 
 
 def _parsed(result: Result, attribute: str) -> Any:

@@ -614,6 +614,28 @@ def sized(size, **facts):
     return lambda t: dataclasses.replace(t, points=size * t.points, **facts)
 
 
+def backwards(trial):
+    """A body that is carried along its wave."""
+    middle = trial.points.mean(1, keepdims=True)
+    return changed(trial, trial.points - 2 * (middle - middle[0]))
+
+
+def wandering(trial):
+    """A body whose bends never repeat."""
+    walk = np.cumsum(np.random.default_rng(0).normal(size=(3, len(trial.t), 1)), 1)
+    a, b, c = 0.1 * walk
+    s = np.linspace(-0.5, 0.5, 20) + 0 * a
+    return trial_of(trial.t, np.stack([s, a * s**2 + b * s**3 + c * s**4], -1))
+
+
+def rippling(trial):
+    """A body along which, from the middle of the trial on, runs a shorter wave."""
+    s = np.linspace(-0.5, 0.5, 20)
+    waves = 1 + np.clip(2 * trial.t - 3, 0, 1)[:, None]
+    y = 0.1 * np.sin(2 * np.pi * (waves * s + trial.t[:, None]))
+    return trial_of(trial.t, np.stack([s + 0.3 * trial.t[:, None], y], -1))
+
+
 def slower(by):
     """A change: a second of it takes so much longer."""
     return lambda t: dataclasses.replace(t, t=t.t + by * np.clip(t.t - 1.5, 0, 1))
@@ -631,6 +653,10 @@ def slower(by):
         (lambda t: frames_of(t, slice(20)), "the trial has 0.[0-9]* cycles: give one full cycle at least"),
         (at(np.indices((133, 30)).sum(0) % 2 * (np.arange(133) > 9)[:, None] > 0, np.nan), "10 frames have most"),
         (standing, "the body bends in one shape to and fro"),
+        (backwards, "moves towards its point 1, and so does its wave: most .*say which end is the head, head first or last"),
+        (wandering, "the body does not repeat its motion: give one cycle"),
+        (rippling, "the cycle from t = 0.2371 to 1.215 does not repeat the others .*: cut it out"),
+        (lambda t: frames_of(t, np.arange(133) % 30 < 20), "no frames for 0.367 after this one, and so in every cycle"),
         (slower(2.0), "the cycle from t = 1.16 to 3.499 takes 1.7 times as long as most"),
     ],
 )  # fmt: skip

@@ -11,7 +11,7 @@ import scipy.optimize
 import geomech
 from geomech import plots
 from geomech.core.variables import Result
-from geomech.mathematics.gaits import Butterfly, Circle, Ellipse, Fourier, Sine
+from geomech.mathematics.gaits import Butterfly, Circle, Ellipse, Fourier, Sine, Wave
 from geomech.mathematics.geometry.reconstruct import turning
 from geomech.mathematics.systems import Swimmer, Table
 from geomech.mathematics.tiers.base import Numerics
@@ -755,3 +755,11 @@ def test_singular_shapes_limit_a_loop_and_time_stepping_has_no_ccf(stroke):
     request = dataclasses.replace(stroke.request, scene=past)
     stepped = dataclasses.replace(stroke, request=request)
     assert {*limiting(stepped)} == {"loop"}
+
+
+def test_a_loop_of_three_joints_needs_no_field():
+    four = Swimmer(Viscous(), Chain((1, 1, 1, 1)))
+    scene = Scene(four, Wave(joints=3), Numerics(grid=200))
+    found = geomech.optimise(scene, harmonics=1, starts=1)
+    assert {*found["limited_by"].values} == {"loop"}
+    assert found["value"].values > 0.15

@@ -35,6 +35,10 @@ def study(system):
     return SceneTables(Scene(system, Circle()))
 
 
+def h5py():
+    return pytest.importorskip("h5py")
+
+
 @pytest.mark.parametrize("version", [5, 7.3])
 def test_a_struct_of_every_version_is_read(version, tmp_path):
     table = Table(write(tmp_path / "s.mat", version))
@@ -43,6 +47,10 @@ def test_a_struct_of_every_version_is_read(version, tmp_path):
     assert (table.chain, table.assumed) == (SWIMMER.body, ())
     with pytest.raises(Refusal, match="says the body's length itself, 1 BL: drop body"):
         Table(table.file, body_length=0.3)
+    with pytest.raises(Refusal, match="says its body itself: drop the body"):
+        Table(table.file, body=rft.Chain())
+    with pytest.raises(Refusal, match="says sign and order itself: drop sign and"):
+        Table(table.file, sign="-")
 
 
 def test_a_table_predicts_what_its_swimmer_does(tmp_path):
@@ -379,6 +387,24 @@ def test_damaged_files_of_version_7_3_are_refused_or_read_as_finite(tmp_path):
         path.write_bytes(bad)
         with contextlib.suppress(Refusal):
             assert np.isfinite(tables.load(path).connection.A).all()
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda s: s.__setitem__("again", s), "is damaged at s.again.again"),
+        (
+            lambda s: s.__setitem__("far", h5py().SoftLink("/s/x")),
+            "has s.far in another",
+        ),
+    ],
+)
+def test_links_in_files_of_version_7_3_are_refused(spoil, said, tmp_path):
+    path = write(tmp_path / "s.mat", 7.3)
+    with h5py().File(path, "a") as file:
+        spoil(file["s"])
+    with pytest.raises(Refusal, match=said):
+        tables.load(path)
 
 
 # Structs that we write.

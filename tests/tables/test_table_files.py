@@ -195,6 +195,10 @@ def test_parts_that_a_netcdf_file_lacks_are_none(tmp_path):
         (put("harmonics", (1, 2, 3, 0), np.nan), "has harmonics that is not finite"),
         (put("even_part", (1, 2, 3), np.nan), "has even_part that is not finite"),
         (
+            cut("even_part", np.s_[:2], ("two", *GRID)),
+            "has even_part over (two, alpha_1, alpha_2) where it must be (component, a",
+        ),
+        (
             cut("A_error", np.s_[:, :1], ("component", "one", *GRID)),
             "has A_error over (component, one,",
         ),
@@ -491,6 +495,11 @@ def test_what_a_matlab_file_does_not_state_is_the_usual(tmp_path):
 def test_parts_of_a_matlab_file_that_do_not_fit_are_refused(changes, said, tmp_path):
     matlab(tmp_path / "a.mat", changes)
     assert_refused(tmp_path / "a.mat", said, sign="+")
+
+
+def test_a_connection_without_x_does_not_tell_its_sign(tmp_path):
+    matlab(tmp_path / "a.mat", {"Ax1": 0 * PLAIN, "Ax2": 0 * PLAIN})
+    assert_refused(tmp_path / "a.mat", "does not tell the sign of A: say sign = '+'")
 
 
 @pytest.mark.parametrize(

@@ -234,7 +234,8 @@ def _stored(contents: _Contents, sign: str, sha256: str) -> Stored:
 
     even = None
     if "even_part" in contents and not masked.any():
-        even = _even_part(contents)
+        field = contents.field("even_part", "component")
+        even = checked_numbers("even_part", field)
     _check_pairs(contents, masked)
     metric, power_degree = _metric(contents, degree)
     error = None
@@ -362,14 +363,6 @@ def _harmonics(
         checked_numbers("harmonics_residual", residual),
         degree,
     )
-
-
-def _even_part(contents: _Contents) -> np.ndarray:
-    """Return the rms (3, N_1, ...) of the part of xi that is even in alphadot."""
-    even = checked_numbers("even_part", contents.field("even_part", "component"))
-    if even.shape[0] != 3:
-        raise Refusal(f"has even_part of shape {even.shape} where it must be (3, ...)")
-    return even
 
 
 def _taylor_series(contents: _Contents, factor: float) -> TaylorSeries:

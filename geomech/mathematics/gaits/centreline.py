@@ -144,6 +144,7 @@ class Centreline(Gait):
             raise Refusal(
                 "a measured centreline takes no centre",
                 because="it undulates about the straight body",
+                instead="leave centre out",
             )
         if not isinstance(self.sha256, str):
             raise Refusal("sha256 must be text", value=self.sha256)

@@ -168,6 +168,7 @@ class Sine(Gait):
             raise Refusal(
                 "a sine wave takes no centre",
                 because="it undulates about the straight body",
+                instead="leave centre out",
             )
         in_range("waves", self.waves, 0, self.elements / 4)
         if not self.waves > 0:

@@ -169,8 +169,8 @@ class Table:
         joints = len(stored.connection.axes)
         if joints != self.body.joints:
             raise Refusal(
-                f"the body has {self.body.joints} shape variables,"
-                f" {self.file} {joints}",
+                f"the numbers of shape variables differ, {self.body.joints} of the"
+                f" body and {joints} of {self.file}",
                 instead="mend one",
             )
         if self.body.length is not None:

@@ -11,6 +11,7 @@ from geomech.questions.shared import parsing, tools
 from geomech.questions.shared.base import Option, Question, Run
 from geomech.questions.shared.common import Store
 from geomech.run.cost import Cost
+from rft.core.checks import real_array
 
 if TYPE_CHECKING:
     from geomech.studies.grains.drag import DraggedRod
@@ -101,7 +102,8 @@ class DragGrains(Question):
     parallel: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        self._set(angles=tuple(float(angle) for angle in self.angles))
+        angles = real_array("``angles``", self.angles)
+        self._set(angles=tuple(angles.ravel().tolist()))
 
     @property
     def title(self) -> str:

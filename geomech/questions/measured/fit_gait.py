@@ -117,7 +117,8 @@ class FitGait(Question):
     table: ClassVar[tuple[str, ...]] = ("cycle",)
 
     def __post_init__(self) -> None:
-        self._set(columns=tools.as_words(self.columns), effects=tuple(self.effects))
+        columns = tools.as_words("columns", self.columns)
+        self._set(columns=columns, effects=tuple(self.effects))
 
     @property
     def path(self) -> Path | None:

@@ -13,7 +13,7 @@ from geomech.core.errors import Note, choose
 from geomech.core.variables import COMPONENTS, Result, Variable, same_or_each
 from geomech.questions.shared import base
 from rft.core.checks import is_number
-from rft.core.refusal import in_line
+from rft.core.refusal import Refusal, in_line
 
 FILMS = (".gif", ".mp4")
 
@@ -28,12 +28,15 @@ def as_numbers(values: Any) -> Any:
     return tuple(np.asarray(values).tolist())
 
 
-def as_words(names: Any) -> Any:
-    """Return a name or a list of names as a tuple, none for None."""
+def as_words(place: str, names: Any) -> tuple:
+    """Return a name or a list of names as a tuple, none for None; Refusal, with
+    ``place``, for anything else."""
     if names is None:
         return ()
     if isinstance(names, str):
         return (names,)
+    if not isinstance(names, Iterable):
+        raise Refusal(f"``{place}`` must be a name or a list of names", value=names)
     return tuple(names)
 
 

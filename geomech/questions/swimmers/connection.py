@@ -157,7 +157,7 @@ class Connection(Question):
         if self.sliced and self.compare_frame is not None:
             raise Refusal(
                 "``compare_frame`` draws maps of two joints",
-                instead="drop it, or see ``SceneTables.ccf(pair=...)``",
+                instead="drop it, or compare CCFs of the pair ('geomech ccf')",
             )
         self.plan.check()
 

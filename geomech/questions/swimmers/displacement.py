@@ -68,7 +68,7 @@ class Displacement(Question):
             amplitudes = getattr(self.gait or self.scene.gait, "amplitude", 1.0)
         tiers = self.tiers
         if tiers is not None:
-            tiers = tools.as_words(tiers)
+            tiers = tools.as_words("tiers", tiers)
         self._set(amplitudes=tools.as_numbers(amplitudes), tiers=tiers)
 
     @property

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 
@@ -41,8 +40,6 @@ def columns(
     """Return the columns ``required`` (N,), and those of ``optional`` that the file
     has, by name, in the units of `KINDS`. Refusal, with ``place`` and the line, for any
     other file."""
-    if not isinstance(path, (str, Path)):
-        raise Refusal("file must be the name of a CSV file", value=path, where=place)
     header = ",".join(required)
     accepted = [column(name) for name in (*required, *optional)]
     with located(place):

@@ -15,6 +15,7 @@ from geomech.run.cost import BASE, Cost, TooLong, duration
 from geomech.run.runner import runner
 from geomech.run.store import cache_folder
 from geomech.studies.terradynamics.calibration import fit_variables
+from rft.core.checks import in_range, is_number, is_whole
 from rft.core.refusal import Refusal, require
 from rft.fits.rods import Fit, fit
 from rft.grains.bed import Bed
@@ -78,6 +79,8 @@ def store_folder(given: Path | None) -> Path:
     """Return the folder of settled beds and runs: the one given, else that in the
     user's cache folder."""
     if given is not None:
+        if not isinstance(given, (str, Path)):
+            raise Refusal("``store`` must be the name of a folder", value=given)
         return Path(given)
     folder = cache_folder()
     if folder is None:
@@ -130,8 +133,16 @@ class DraggedRod:
             "angles must be 0 to 90 degrees",
             value=angles,
         )
-        require(1 <= self.beds <= 100, "beds must be 1 to 100", value=self.beds)
-        require(self.speed > 0, "speed must be > 0", value=self.speed)
+        in_range("beds", self.beds, 1, 100, whole=True)
+        require(is_whole(self.seed), "seed must be a whole number", value=self.seed)
+        for name in ("length", "radius", "speed"):
+            value = getattr(self, name)
+            require(
+                is_number(value) and 0 < value < math.inf,
+                f"{name} must be a number above 0",
+                value=value,
+            )
+        require(isinstance(self.bed, Bed), "bed must be Bed(...)", value=self.bed)
         require(
             self.length >= 20 * self.radius,
             "a rod must be ten times as long as it is wide",

@@ -20,6 +20,7 @@ from geomech.studies.grains.drag import GrainSteps, grain_cost, store_folder
 from geomech.studies.scene_tables import SceneTables
 from geomech.studies.terradynamics.calibration import rod_fit
 from rft.bodies.links import Links
+from rft.core.checks import in_range, is_number
 from rft.core.refusal import Refusal, located, require
 from rft.effects import EndCaps
 from rft.grains.bed import Bed
@@ -105,11 +106,15 @@ class GrainSwim:
         """The bed, the body and its motion."""
         body = self.swimmer.body
         size = self._size()
-        require(0 < size < np.inf, "length must be > 0", value=size)
+        require(
+            is_number(size) and 0 < size < np.inf,
+            "length must be a number above 0",
+            value=size,
+        )
         radius = self._radius(size)
         require(
-            0 < radius < size / 2,
-            "radius must be > 0 and below half of the length",
+            is_number(radius) and 0 < radius < size / 2,
+            "radius must be a number above 0 and below half of the length",
             value=radius,
         )
 
@@ -149,7 +154,7 @@ class GrainSwim:
     def check(self) -> None:
         """Refuse scenes and sizes that no bed takes, and beds without the engine of
         grains."""
-        require(1 <= self.cycles <= 1000, "cycles must be 1 to 1000", value=self.cycles)
+        in_range("cycles", self.cycles, 1, 1000, whole=True)
         with located(self.scene.name):
             self.experiment.check()
         load_lammps()

@@ -39,7 +39,7 @@ from geomech.studies.estimates.effort import shares_velocities, why_no_metric
 from geomech.studies.maps import fields
 from geomech.studies.maps.fields import WHOLE, has_matrix
 from geomech.studies.scene_tables import SceneTables, refuse_outside
-from rft.core.checks import is_whole
+from rft.core.checks import is_whole, real_array
 from rft.core.refusal import Refusal, located
 
 NO_MAP_MESSAGE = (
@@ -169,7 +169,11 @@ class Plan:
             if self.metric:
                 reason = why_no_metric(system)
                 if reason:
-                    raise Refusal(reason, where=self.scene.name)
+                    raise Refusal(
+                        reason,
+                        where=self.scene.name,
+                        instead="drop ``metric`` and ``stretch``",
+                    )
             if self.other_frame is not None and len(self.pairs_and_origins) > 1:
                 raise Refusal(
                     "``compare_frame`` draws one pair of joints",
@@ -439,6 +443,9 @@ def plane_origin(
     if angles is None:
         return origin
 
+    values = real_array("``slice``", angles)
+    if values.ndim != 1:
+        raise Refusal("``slice`` must be a list of angles", value=angles)
     extent = scene.numerics.extent
     has_own_field = stored_table(scene.system, "connection")
     if not (has_own_field or all(abs(angle) <= extent for angle in angles)):

@@ -54,8 +54,8 @@ def form_of(measured: str | Path | Log | Trial, options: Mapping[str, Any]) -> s
     if isinstance(measured, Trial):
         refuse(measured.name, MIDLINES, of_logs)
         return MIDLINES
+    header = read_header(measured, reader.LARGEST_FILE, HEADERS)
     file = Path(measured)
-    header = read_header(file, reader.LARGEST_FILE, HEADERS)
     form = reader.kind_of(header)
     if not form and of_logs and of_midlines:
         raise Refusal(

@@ -328,7 +328,10 @@ def refined(scene: Scene, finer: int) -> Scene:
     gait = getattr(scene, "gait", scene)
     if not isinstance(gait, Sine):
         kind = type(gait).__name__.lower()
-        raise Refusal(f"refined is that of a sine wave, got a {kind}")
+        raise Refusal(
+            f"refined is that of a sine wave, got a {kind}",
+            instead="give a scene with a sine wave",
+        )
     elements = finer * gait.elements
     body = dataclasses.replace(scene.system.body, elements=elements)
     return scene.changed(body=body, gait=dataclasses.replace(gait, elements=elements))

@@ -76,9 +76,10 @@ class Optimum:
 
     @cached_property
     def gained(self) -> Gained | None:
-        """CCF whose area the best gait gains; None where the velocity does not follow
-        from shape alone."""
-        if self.scene.system.traits.steps:
+        """CCF whose area the best gait gains; None with other than two joints, or where
+        the velocity does not follow from shape alone."""
+        system = self.scene.system
+        if system.joints != 2 or system.traits.steps:
             return None
         is_turning = self.request.objective.name == "turning"
         return gained_ccf(self.study.fitted, self.best, is_turning)

@@ -155,7 +155,7 @@ def loop(optimum: Optimum) -> list[Variable]:
 def gained(optimum: Optimum) -> tuple[list[Variable], Mapping[str, Any]]:
     """Return the CCF whose area the best gait gains, over two joints, and as attributes
     its component and frame; nothing where there is none."""
-    if optimum.scene.system.joints != 2 or optimum.gained is None:
+    if optimum.gained is None:
         return [], {}
     field, component = optimum.gained
     frame = "minimum-perturbation"

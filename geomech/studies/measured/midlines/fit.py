@@ -148,7 +148,8 @@ def fit_midlines(
     if clock.ratio < kinematics.STANDING:
         raise trial.wrong(
             "the body bends in one shape to and fro",
-            because="no wave runs along it, and has a wavelength",
+            because="no wave runs along it",
+            instead="give a trial of a body along which one runs",
         )
     marks, used = full_cycles(trial, curve, clock)
     turn, words = _head(trial, used_cycles(curve, clock, marks, used), head)
