@@ -27,7 +27,8 @@ class FloatingChain(Momentum):
     Examples
     --------
     >>> from geomech.mathematics.systems import FloatingChain
-    >>> FloatingChain(lengths=(1, 1, 1)).velocity([0.5, 0.3], [1.0, 0.0]).round(4)
+    >>> xi = FloatingChain(lengths=(1, 1, 1)).velocity([0.5, 0.3], [1.0, 0.0])
+    >>> xi.round(4) + 0.0  # no -0
     array([ 0.    ,  0.    , -0.0841])
     """
 
