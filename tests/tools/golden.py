@@ -360,7 +360,6 @@ def grains():
 # A question, its subject, its fields, and options of its picture.
 PICTURES = {
     "ccf": ("ccf", "scene.toml", {}, {}),
-    "ccf, contours": ("ccf", "scene.toml", {}, {"style": "contours"}),
     "ccf, one": ("ccf", "viscous.toml", {}, {"component": "theta", "clim": 0.1}),
     "ccf, metric": ("ccf", "viscous.toml", {"metric": True}, {}),
     "ccf, stretched": ("ccf", "viscous.toml", {"stretched": True}, {"stretch": True}),
