@@ -20,7 +20,7 @@ GROUPS = {  # headings of the folders, in the order of the page
     "accuracy": "Accuracy and cost",
     "": "The picture of the README",
 }
-NO_FIGURES = {"__init__", "style", "peers", "others"}
+NO_FIGURES = {"__init__", "style", "peers", "plain_loop", "others"}
 
 
 def draw_missing() -> None:

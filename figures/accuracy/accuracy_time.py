@@ -74,7 +74,8 @@ def compute(
     for name, (solve, counts) in PEERS.items():
         if solve is None and "numba" not in backends():
             continue
-        solve = solve or peers.plain_loop()
+        if solve is None:
+            from figures.plain_loop import solve
         counts = [n for n in counts if n in phases]
         found["peers"][name] = by_peer(solve, scene, amplitudes, truth, counts, starts)
     rows = [*found["direct"].values(), *found["estimated"].values()]

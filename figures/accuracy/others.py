@@ -123,7 +123,9 @@ def samples() -> list[Row]:
         "least_squares": functools.partial(one_by_one, peers.one_least_squares),
     }
     if "numba" in backends():
-        programs["plain"] = functools.partial(peers.plain_loop(), alpha, alphadot)
+        from figures.plain_loop import solve
+
+        programs["plain"] = functools.partial(solve, alpha, alphadot)
     for how in backends():
         options = {"backend": how, "threads": 1}
         programs[how] = functools.partial(

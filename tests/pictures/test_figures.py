@@ -32,7 +32,12 @@ SCRIPTS = {
     info.name
     for info in pkgutil.walk_packages(figures.__path__, "figures.")
     if not info.ispkg and ".campaigns." not in info.name
-} - {"figures.style", "figures.peers", "figures.accuracy.others"}
+} - {
+    "figures.style",
+    "figures.peers",
+    "figures.plain_loop",
+    "figures.accuracy.others",
+}
 
 
 # All of them

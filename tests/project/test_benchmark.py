@@ -111,9 +111,9 @@ def test_against_a_loop_of_fsolve():
     asked = {"loop": loop}
     samples = {"loop": len(some)}
     if "numba" in backends():
-        asked["plain compiled loop"] = functools.partial(
-            peers.plain_loop(), alpha, alphadot
-        )
+        from figures.plain_loop import solve
+
+        asked["plain compiled loop"] = functools.partial(solve, alpha, alphadot)
         samples["plain compiled loop"] = len(alpha)
     for how in backends():
         name = f"field, {NAMES[how]}"
@@ -140,8 +140,9 @@ def test_against_a_loop_of_fsolve():
     solution = body_velocity(GLASS, MIDDLE, alpha, alphadot)
     if "numba" in backends():
         assert each["plain compiled loop"] > 3 * each["whole field, compiled"]
-        plain = peers.plain_loop()(alpha, alphadot)
-        np.testing.assert_allclose(plain, solution.xi, rtol=0, atol=1e-6)
+        np.testing.assert_allclose(
+            solve(alpha, alphadot), solution.xi, rtol=0, atol=1e-6
+        )
     failed = np.mean([answer[2] != 1 for answer in answers])
     off = np.abs([answer[0] for answer in answers] - solution.xi[some]).max(-1)
     print(f"  the loop says that it fails in {failed:.0%}", end=", ")
@@ -153,12 +154,14 @@ def test_against_a_loop_of_fsolve():
 def test_one_velocity_against_a_plain_loop():
     """By `body_velocity`, by a call that is prepared, and by the plain loop for one
     sample, which checks and assembles nothing."""
+    from figures.plain_loop import solve
+
     asked_of = GLASS, MIDDLE
     how = {"backend": "numba"}
     one = [0.5, 0.3], [1.0, 0.0]
     arrays = [np.array([x]) for x in one]
     asked = {
-        "plain compiled loop": functools.partial(peers.plain_loop(), *arrays),
+        "plain compiled loop": functools.partial(solve, *arrays),
         "body_velocity": functools.partial(body_velocity, *asked_of, *one, **how),
         "prepared": functools.partial(BodyVelocity(*asked_of, **how), *one),
     }
