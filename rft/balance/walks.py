@@ -87,6 +87,18 @@ def copy_point(point, to):
 
 
 @register_jitable
+def write_rest(rows, speed, point):
+    """Write the point at which the frame is at rest; speed: scale of the elements'
+    velocities."""
+    for j in range(4):
+        point.xi[j] = 0.0
+    for k in range(len(rows)):
+        for j in range(3):
+            for lane in range(WIDTH):
+                point.v[k, j, lane] = rows[k, ELEMENTS + V_T + j, lane] / speed
+
+
+@register_jitable
 def shift_point(point, rows, change, to):
     """Write the point after a change (4,) of (xi, log rounding) to another."""
     for j in range(3):
@@ -97,6 +109,15 @@ def shift_point(point, rows, change, to):
         due = to_element(e, change[0], change[1], change[2])
         for j in range(3):
             store(to.v[k], j, load(point.v[k], j) + due[j])
+
+
+@register_jitable
+def write_velocities(e, change, due):
+    """Write what a change of the frame's velocity does to elements' velocities, (3, 8),
+    to ``due``."""
+    triple = to_element(e, change[0], change[1], change[2])
+    for j in range(3):
+        store(due, j, triple[j])
 
 
 @register_jitable
@@ -114,9 +135,7 @@ def size_of(point, rows, change, due):
     largest = 0.0
     for k in range(len(rows)):
         e = read_elements(rows[k], ELEMENTS)
-        triple = to_element(e, change[0], change[1], change[2])
-        for j in range(3):
-            store(due, j, triple[j])
+        write_velocities(e, change, due)
         for lane in range(WIDTH):
             square = 0.0
             for j in range(3):
@@ -181,9 +200,7 @@ def write_border(point, rows, tangent, due, border):
     border[3] = tangent[3]
     for k in range(len(rows)):
         e = read_elements(rows[k], ELEMENTS)
-        triple = to_element(e, tangent[0], tangent[1], tangent[2])
-        for j in range(3):
-            store(due, j, triple[j])
+        write_velocities(e, tangent, due)
         for lane in range(WIDTH):
             scale = squared_speed(point.v[k], lane) + rounding2
             for j in range(3):
@@ -197,6 +214,61 @@ def write_border(point, rows, tangent, due, border):
         for lane in range(WIDTH):
             for j in range(3):
                 border[j] += due[j, lane]
+
+
+@register_jitable
+def write_viscous(sums, change):
+    """Write the change from rest to the viscous solution, from force, moment and slopes
+    in the first column of ``sums``."""
+    xi = solve3(
+        (sums[3, 0], sums[4, 0], sums[5, 0]),
+        (sums[6, 0], sums[7, 0], sums[8, 0]),
+        (sums[9, 0], sums[10, 0], sums[11, 0]),
+        (-sums[0, 0], -sums[1, 0], -sums[2, 0]),
+    )
+    for j in range(3):
+        change[j] = xi[j]
+    change[3] = 0.0
+
+
+@register_jitable
+def predict(base, tangent, step, last_rounding, change):
+    """Write the change from the base by a step along the tangent, which is straight in
+    (xi, rounding), and return whether it reaches the required rounding."""
+    slope = tangent[3]
+    rounding = base.xi[3] * np.exp(min(max(step * slope, -100.0), 5.0))
+    reaches_last = rounding <= last_rounding
+    if reaches_last:
+        rounding = last_rounding
+    ratio = rounding / base.xi[3]
+    length = step
+    if abs(slope) >= 1e-9:
+        length = (ratio - 1.0) / slope
+    for j in range(3):
+        change[j] = tangent[j] * length
+    change[3] = np.log(ratio)
+    return reaches_last
+
+
+@register_jitable
+def most_corrections(reaches_last, is_fine):
+    """Return after how many corrections a step has failed."""
+    if is_fine:
+        return MOST_FINE
+    if reaches_last:
+        return MOST_AT_THE_END
+    return MOST_CORRECTIONS
+
+
+@register_jitable
+def next_step(step, factor, failed, on_curve):
+    """Return the length of the next step; factor: that by which the first correction
+    asks to change it."""
+    if on_curve:
+        return step * min(max(factor, 1.0 / GROWTH), GROWTH)
+    if failed:
+        return step * min(max(factor, 0.1), SHRINKAGE)
+    return step
 
 
 @functools.cache
@@ -285,13 +357,7 @@ def walk_kernel(Law: type):
             )
 
             # The viscous solution, with a first step towards less rounding.
-            for j in range(4):
-                point.xi[j] = 0.0
-            for k in range(n_vectors):
-                for j in range(3):
-                    for lane in range(WIDTH):
-                        u = rows[k, ELEMENTS + V_T + j, lane]
-                        point.v[k, j, lane] = u / scales.speed_scale
+            write_rest(rows, scales.speed_scale, point)
             write_net(
                 law,
                 point_terms,
@@ -304,19 +370,10 @@ def walk_kernel(Law: type):
                 v,
                 sums,
             )
-            viscous = solve3(
-                (sums[3, 0], sums[4, 0], sums[5, 0]),
-                (sums[6, 0], sums[7, 0], sums[8, 0]),
-                (sums[9, 0], sums[10, 0], sums[11, 0]),
-                (-sums[0, 0], -sums[1, 0], -sums[2, 0]),
-            )
-            for j in range(3):
-                change[j] = viscous[j]
-                tangent[j] = 0.0
-                border[j] = 0.0
-            change[3] = 0.0
-            tangent[3] = -1.0
-            border[3] = -1.0
+            write_viscous(sums, change)
+            for j in range(4):
+                tangent[j] = -unit[j]
+                border[j] = -unit[j]
             shift_point(point, rows, change, base)
             base.xi[3] = max(WIDEST, last_rounding)
             step = FIRST_STEP
@@ -330,19 +387,7 @@ def walk_kernel(Law: type):
 
             while True:
                 if from_base:
-                    # The step is straight in (xi, rounding).
-                    slope = tangent[3]
-                    rounding = base.xi[3] * np.exp(min(max(step * slope, -100.0), 5.0))
-                    reaches_last = rounding <= last_rounding
-                    if reaches_last:
-                        rounding = last_rounding
-                    ratio = rounding / base.xi[3]
-                    length = step
-                    if abs(slope) >= 1e-9:
-                        length = (ratio - 1.0) / slope
-                    for j in range(3):
-                        change[j] = tangent[j] * length
-                    change[3] = np.log(ratio)
+                    reaches_last = predict(base, tangent, step, last_rounding, change)
                     copy_point(base, point)
                     damping = 1.0
                     corrections = 0
@@ -407,11 +452,7 @@ def walk_kernel(Law: type):
                     solve4(old_matrix, right, work, simplified)
                     limit = (1.0 - 0.5 * damping) * size
                     smaller |= size_of(point, rows, simplified, due) <= limit
-                most = MOST_CORRECTIONS
-                if reaches_last:
-                    most = MOST_AT_THE_END
-                if is_fine:
-                    most = MOST_FINE
+                most = most_corrections(reaches_last, is_fine)
                 failed = not np.isfinite(new_size)
                 failed |= first and new_size > LARGEST_CORRECTION
                 failed |= not (smaller or is_fine) or corrections >= most
@@ -442,10 +483,7 @@ def walk_kernel(Law: type):
                 factor = np.sqrt(intended / 1e-9)
                 if first_size > 1e-9:
                     factor = np.sqrt(intended / first_size)
-                if on_curve:
-                    step *= min(max(factor, 1.0 / GROWTH), GROWTH)
-                if failed:
-                    step *= min(max(factor, 0.1), SHRINKAGE)
+                step = next_step(step, factor, failed, on_curve)
                 from_base = failed or on_curve
                 if base.xi[3] > LOST * max(WIDEST, last_rounding):
                     break
