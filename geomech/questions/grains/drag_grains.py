@@ -133,8 +133,8 @@ class DragGrains(Question):
         return store_folder(self.store)
 
     def check(self) -> None:
-        self.study.check()
         _ = self.store_folder  # refuses where there is none
+        self.study.check()  # its last step loads LAMMPS
 
     def cost(self) -> Cost:
         return self.study.cost(self.store_folder)

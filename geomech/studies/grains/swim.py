@@ -157,8 +157,8 @@ class GrainSwim:
         in_range("cycles", self.cycles, 1, 1000, whole=True)
         with located(self.scene.name):
             self.experiment.check()
+        store_folder(self.store)  # refuses where there is none
         load_lammps()
-        store_folder(self.store)
 
     def cost(self) -> GrainSteps:
         return grain_cost([self.experiment], store_folder(self.store))
