@@ -7,18 +7,8 @@ import math
 import warnings
 from collections.abc import Iterable
 
-from rft.core.refusal import Refusal, formatted, spell_arguments
-
-
-class Note(UserWarning):
-    """A warning that something is likely not meant, though it is done; on the command
-    line a line on standard error.
-
-    It names arguments as a `Refusal` does, in double backticks, which ``args[0]``
-    keeps."""
-
-    def __str__(self) -> str:
-        return spell_arguments(str(self.args[0]))
+from rft.core.notes import Note
+from rft.core.refusal import Refusal, formatted
 
 
 class UnitWarning(Note):

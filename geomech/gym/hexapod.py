@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 from gymnasium.vector.utils import batch_space
 
-from rft.balance.backend import Note
+from rft.core.notes import Note
 from rft.core.refusal import require
 from rft.mujoco import Sand, attach
 from rft.mujoco.example import hexapod

@@ -33,9 +33,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geomech.core.errors import Note
 from geomech.io import files
 from geomech.io.foreign import refuse_foreign
+from rft.core.notes import Note
 from rft.core.refusal import Refusal, formatted, located
 
 LARGEST_NUMBER = 1e12

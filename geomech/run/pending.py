@@ -11,7 +11,6 @@ from concurrent.futures import BrokenExecutor
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from geomech.core.errors import Note
 from geomech.run.backend import preferred
 from geomech.run.cost import is_undecided
 from geomech.run.executors import Executor, defer_signals
@@ -23,6 +22,7 @@ from geomech.run.tasks import (
     result_type,
     unpack_outcome,
 )
+from rft.core.notes import Note
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:

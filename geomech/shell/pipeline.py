@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from geomech.core.errors import Note
 from geomech.core.summary import wrapped
 from geomech.core.variables import Result
 from geomech.io.files import atomic_file, atomic_folder, note, refuse_inputs
@@ -21,6 +20,7 @@ from geomech.results import show
 from geomech.run.backend import prefer_for
 from geomech.run.cost import Cost, decide
 from geomech.shell import terminal
+from rft.core.notes import Note
 from rft.core.refusal import Refusal, in_line
 
 MORE = "--all prints all variables"

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import warnings
 
-from geomech.core.errors import Note
+from rft.core.notes import Note
 
 COMMANDS = {
     "fit": "fit-gait",

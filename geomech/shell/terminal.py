@@ -22,9 +22,9 @@ from typing import Any
 
 import typer
 
-from geomech.core.errors import Note
 from geomech.run import THREAD_VARIABLES
 from geomech.run.progress import progress
+from rft.core.notes import Note
 from rft.core.refusal import Refusal, line, printable, spell_arguments
 
 __all__ = ["Stopped", "exit_code", "progress", "report", "show", "stoppable"]
@@ -154,18 +154,13 @@ def collected_notes() -> Iterator[dict[str, str]]:
     notes: dict[str, str] = {}
     with warnings.catch_warnings():
         warnings.simplefilter("always", Note)
-        # Notes of rft are of a class of its own, which takes NumPy to load.
-        warnings.filterwarnings("always", category=UserWarning, module=r"rft\.")
         show_others = warnings.showwarning
 
         def collect(message, category, *where, **options):
-            if issubclass(category, Note):
-                text = spell_arguments(message.args[0], option)
-            elif category.__module__.partition(".")[0] == "rft":
-                text = str(message)
-            else:
+            if not issubclass(category, Note):
                 show_others(message, category, *where, **options)
                 return
+            text = spell_arguments(message.args[0], option)
             kind = re.split(r"[\d.]+ ", text)[0]
             notes.setdefault(kind, text)
 

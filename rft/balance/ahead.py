@@ -9,9 +9,11 @@ from __future__ import annotations
 import functools
 import importlib
 import importlib.util
+import warnings
 from collections.abc import Callable
 from types import ModuleType
 
+from rft.core.notes import Note
 from rft.laws.records import Terms
 
 NAME = "rft.balance._kernels"
@@ -20,10 +22,21 @@ INSTRUCTIONS = ("AVX2", "FMA3")
 
 @functools.cache
 def library() -> ModuleType | None:
-    """Return the module of kernels; None if there is none for this processor."""
+    """Return the module of kernels; None if there is none for this processor, or, with
+    a `Note`, if it does not load."""
     if importlib.util.find_spec(NAME) is None or not _can_run():
         return None
-    return importlib.import_module(NAME)
+    try:
+        return importlib.import_module(NAME)
+    except ImportError as error:
+        reason = str(error).splitlines()[0]
+        warnings.warn(
+            f"the compiled balances of this wheel do not load: {reason}; slower code "
+            "computes the same: install the wheel for this version of Python",
+            Note,
+            stacklevel=2,
+        )
+        return None
 
 
 def has(Law: type) -> bool:

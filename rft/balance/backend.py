@@ -25,11 +25,6 @@ from rft.laws.records import is_compilable
 BACKENDS = ("auto", "numpy", "numba")
 
 
-class Note(UserWarning):
-    """A warning of a fault that changes no result; the command line prints it as one
-    line on standard error."""
-
-
 def check(backend: str) -> None:
     """Raise ValueError unless a back end exists and is installed."""
     if not (isinstance(backend, str) and backend in BACKENDS):

@@ -31,7 +31,7 @@ from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 from numba.misc.appdirs import user_cache_dir
 
-from rft.balance.backend import Note
+from rft.core.notes import Note
 from rft.core.refusal import Refusal
 from rft.formulas import simd, vectors
 

@@ -19,7 +19,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from rft.balance.backend import Note, compiles
+from rft.balance.backend import compiles
+from rft.core.notes import Note
 from rft.core.refusal import require
 from rft.mujoco import numpy_step
 from rft.mujoco.bed import Bed

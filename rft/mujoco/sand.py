@@ -12,8 +12,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from rft.balance.backend import Note
 from rft.core.checks import in_range
+from rft.core.notes import Note
 from rft.core.refusal import Refusal, formatted, located, require
 from rft.mujoco import installed
 from rft.mujoco.bed import Bed, Surface
@@ -372,7 +372,7 @@ def attach(
     -----
     The geoms no longer touch planes that lie in the surface; a plane below it remains,
     as the bottom of a shallow bed. What is changed or inexact is a
-    `rft.balance.backend.Note`, a warning of one line.
+    `rft.core.notes.Note`, a warning of one line.
     """
     require(
         isinstance(model, mujoco.MjModel), "model must be a mujoco.MjModel", value=model

@@ -39,8 +39,8 @@ from rft import (
 )
 from rft.balance import ahead, backend, path
 from rft.balance import solver as balance
-from rft.balance.backend import Note
 from rft.bodies import Elements
+from rft.core.notes import Note
 from rft.core.premise import Premise
 from rft.core.refusal import Refusal
 from rft.effects import Effect
@@ -49,7 +49,7 @@ from rft.formulas.momentum import MomentumRate
 from rft.formulas.newton import Limits
 from rft.formulas.vectors import formula, sqrt
 from rft.laws.base import TermLaw
-from rft.laws.records import record
+from rft.laws.records import Terms, record
 
 ROOT = pathlib.Path(__file__).parents[2]
 BODY = Chain((1, 1.4, 0.8), frame="link-1", length=0.3)
@@ -626,6 +626,17 @@ def test_kernels_built_ahead_serve_closed_laws_without_numba(monkeypatch):
     kernels_of.cache_clear()
     plain = body_velocity(GLASS, BODY, (0.4, -0.7), (1.0, 0.3), backend="numpy")
     np.testing.assert_allclose(found.xi, plain.xi, rtol=0, atol=1e-9)
+
+
+def test_kernels_that_do_not_load_are_noted_and_not_used(monkeypatch, tmp_path):
+    (tmp_path / "_kernels.py").write_text("raise ImportError('no version for libc')\n")
+    monkeypatch.setattr("rft.balance.__path__", [str(tmp_path)])
+    monkeypatch.setattr(ahead, "_can_run", lambda: True)
+    ahead.library.cache_clear()
+    with pytest.warns(Note, match="no version for libc"):
+        assert ahead.library() is None
+    assert not ahead.has(Terms)
+    ahead.library.cache_clear()
 
 
 @pytest.mark.timeout(900)  # the oldest numba compiles for minutes

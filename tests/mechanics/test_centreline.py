@@ -8,11 +8,11 @@ import pytest
 from scipy.special import ellipe
 
 from geomech import scenes
-from geomech.core.errors import Note
 from geomech.mathematics.gaits import Centreline, Sine
 from geomech.mathematics.gaits.waves import arc_to_phase
 from geomech.studies.scene_tables import SceneTables
 from rft import Backbone
+from rft.core.notes import Note
 
 pytestmark = pytest.mark.usefixtures("fastest")
 T = np.linspace(0, 2 * np.pi, 97)

@@ -42,7 +42,7 @@ from rft.laws.records import Terms
 pytestmark = [
     pytest.mark.benchmark,
     # Of a floor that is not touched.
-    pytest.mark.filterwarnings("ignore::rft.balance.backend.Note"),
+    pytest.mark.filterwarnings("ignore::rft.core.notes.Note"),
 ]
 CALLS = 50  # of a small batch in a row, as an optimiser makes them
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 import rft
 from rft.balance import backend
-from rft.balance.backend import Note
+from rft.core.notes import Note
 from rft.fits.plates import ZetaFit, fit_stress
 from rft.terradynamics.ground import (
     DisturbedGround,

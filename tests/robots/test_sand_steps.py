@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 
 import rft
 from rft.balance import backend
-from rft.balance.backend import Note, preferring
+from rft.balance.backend import preferring
+from rft.core.notes import Note
 from rft.terradynamics.ground import GrainInertia, Ground, Slope, ground_of
 from rft.terradynamics.meshes import Spatial
 from rft.terradynamics.meshes.forces.contact import Motion, Part, load, load_with_slopes

@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geomech.core.errors import Note
 from geomech.io import rows
 from geomech.mathematics.gaits import frames
 from geomech.scenes.data import drag
@@ -20,6 +19,7 @@ from geomech.scenes.format.columns import columns
 from geomech.scenes.terradynamics import penetration
 from geomech.studies.measured import log as logs
 from geomech.studies.measured.midlines import reader
+from rft.core.notes import Note
 from rft.core.refusal import Refusal
 
 DEPTH = np.array([0.0, 0.5, 1.25, 2.0, 3.5])  # mm

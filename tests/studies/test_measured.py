@@ -16,7 +16,7 @@ from tabled import of_json, tabled
 import geomech
 import rft
 from figures.swimmers import measured_gait
-from geomech.core.errors import Note, UnitWarning
+from geomech.core.errors import UnitWarning
 from geomech.io import tables
 from geomech.io.results import write_netcdf
 from geomech.mathematics import gaits
@@ -42,6 +42,7 @@ from geomech.studies.measured import (
 )
 from geomech.studies.optimisation import optimise
 from geomech.studies.scene_tables import SceneTables
+from rft.core.notes import Note
 from rft.core.refusal import Refusal
 from rft.formulas import se2
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import geomech
-from rft.balance.backend import Note
+from rft.core.notes import Note
 from rft.core.refusal import Refusal
 from rft.terradynamics.meshes import Mesh, MeshFile, Spatial, read, wrench
 from rft.terradynamics.meshes.geoms import mesh_of_elements

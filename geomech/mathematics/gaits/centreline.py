@@ -12,11 +12,12 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geomech.core.errors import Note, UnitWarning
+from geomech.core.errors import UnitWarning
 from geomech.io.rows import LARGEST_NUMBER
 from geomech.mathematics.gaits import frames, midline
 from geomech.mathematics.geometry.gait import GAITS, LARGEST, Gait
 from rft.core.checks import Number, unmasked
+from rft.core.notes import Note
 from rft.core.refusal import Refusal
 
 LARGEST_GAP = 0.25  # of the period, between neighbouring frames

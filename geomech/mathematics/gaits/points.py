@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geomech.core.errors import Note
 from geomech.mathematics.geometry.gait import GAITS, Gait, finite_array
 from rft.core.checks import unmasked
+from rft.core.notes import Note
 from rft.core.refusal import Refusal
 
 LARGEST_BULGE = 1 / 20  # of the size of a polygon: a larger one of the spline is noted

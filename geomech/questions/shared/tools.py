@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from geomech.core.errors import Note, choose
+from geomech.core.errors import choose
 from geomech.core.variables import COMPONENTS, Result, Variable, same_or_each
 from geomech.questions.shared import base
 from rft.core.checks import is_number
+from rft.core.notes import Note
 from rft.core.refusal import Refusal, in_line
 
 FILMS = (".gif", ".mp4")

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from rft.balance.backend import Note
+from rft.core.notes import Note
 from rft.core.refusal import Refusal, formatted, located, require
 from rft.terradynamics.meshes.surfaces import shapes, widened
 from rft.terradynamics.meshes.surfaces.merged import resize_faces

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rft.balance.backend import Note
 from rft.core.metres import LARGEST
+from rft.core.notes import Note
 from rft.core.refusal import Refusal, formatted, located, require
 from rft.terradynamics.meshes.surfaces.mesh import Mesh, require_vertices
 from rft.terradynamics.meshes.surfaces.sound import OPEN_CURE, size_note, sound

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 import mujoco
 import numpy as np
 
-from rft.balance.backend import Note
+from rft.core.notes import Note
 from rft.core.refusal import require
 from rft.mujoco import installed
 from rft.mujoco.bed import Bed
