@@ -1,7 +1,7 @@
-"""The same balance of forces by programs that know nothing of this package: loops of
-SciPy's fsolve and least_squares over midpoints. They are of the three-link swimmer in
-dry grains (Eqs. 2-3), in the frame of the middle link, as is the plain loop with exact
-integrals (`figures.plain_loop`)."""
+"""The same balance of forces without this package: loops of SciPy's fsolve and
+least_squares over midpoints. They solve for the three-link swimmer in dry grains (Eqs.
+2-3) in the frame of the middle link, as does the plain loop with exact integrals
+(`figures.plain_loop`)."""
 
 from __future__ import annotations
 

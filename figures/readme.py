@@ -1,4 +1,4 @@
-"""The README's picture: Fig. 11(d) and (e) side by side."""
+"""Picture of the README: Fig. 11(d) and (e) side by side."""
 
 from __future__ import annotations
 

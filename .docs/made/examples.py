@@ -1,10 +1,10 @@
 """Blocks of code that the build runs.
 
-On any page, ```LANGUAGE FILE is a file of that name. The commands of a block
-```console, `$ ` before each, are run in the folder of the page's files, after its
-programs, and followed by what they print. On a page of the gallery the commands of a
-block ```sh and the programs of a block ```python are run, the picture of the command is
-shown, and the scene is added.
+On any page, a block ```LANGUAGE FILE is a file of that name. The commands of a block
+```console, each after `$ `, are run in the folder of the page's files, after the
+programs of the page, and are followed by what they print. On a page of the gallery the
+commands of a block ```sh and the programs of a block ```python are run, the picture of
+the command is shown, and the scene is added.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def run(code: str, folder: Path, program: bool = False) -> str:
 
 
 def with_output(text: str) -> str:
-    """Return a page with what its commands print."""
+    """Return a page in which every command is followed by what it prints."""
     if "```console\n" not in text:
         return text
     with tempfile.TemporaryDirectory() as folder:
@@ -67,8 +67,7 @@ def _shown(block: re.Match, folder: Path) -> str:
 
 
 class Example:
-    """One section of a page of the gallery: title, text, command, own scene,
-    program."""
+    """One section of a page of the gallery: title, text, command, scene, program."""
 
     def __init__(self, page: str, text: str):
         self.page, self.title = page, text.partition("\n")[0].strip()
@@ -81,12 +80,12 @@ class Example:
         if picture is None or not {"sh", "python"} <= {*self.blocks}:
             raise ValueError(
                 f"{page}.md, {self.title}: an example needs a block sh that draws a "
-                "picture, and a block python"
+                "picture and a block python"
             )
         self.picture = picture[0]
 
     def compute(self) -> None:
-        """Run the command and the program, and store the command's picture."""
+        """Run the command and the program, and store the picture of the command."""
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
             for file, code in self.blocks.values():
@@ -124,7 +123,7 @@ class Example:
 
 
 def sections(page: Path) -> tuple[str, list[Example]]:
-    """Return what stands before the first section of a page of the gallery, and its
+    """Return the text before the first section of a page of the gallery, and the
     sections."""
     head, *parts = re.split(r"(?m)^## ", page.read_text(encoding="utf-8"))
     return head, [Example(page.stem, part) for part in parts]
@@ -163,7 +162,7 @@ def shown(docname: str) -> str:
 
 
 def thumbnails() -> str:
-    """Return a grid of cards for each page of the gallery, a card for each example."""
+    """Return a grid of cards for each page of the gallery, with a card per example."""
     parts = []
     for page in pages():
         head, examples = sections(page)

@@ -1,4 +1,4 @@
-"""The figures of `figures/`: every script with its picture."""
+"""The page of figures: every script of `figures/` with its picture."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ GROUPS = {  # headings of the folders, in the order of the page
     "grains": "Beds of grains",
     "robots": "Robots",
     "accuracy": "Accuracy and cost",
-    "": "The picture of the README",
+    "": "README",
 }
 NO_FIGURES = {"__init__", "style", "peers", "plain_loop", "others"}
 

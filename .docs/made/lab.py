@@ -21,6 +21,6 @@ def frame() -> str:
     return (
         "```{raw} html\n"
         '<iframe class="lab" src="gait-lab.html" title="Gait lab: drag the loop on the map and watch the swimmer"></iframe>\n'
-        '<p><a href="gait-lab.html">The gait lab in a window of its own</a></p>\n'
+        '<p><a href="gait-lab.html">Open the gait lab in its own window</a></p>\n'
         "```"
     )

@@ -1,10 +1,11 @@
 """Accuracy against computing time: the displacement of the built-in swimmer by every
-tier, by NumPy and compiled, with and without its error estimate, beside two programs
-that do not use this package.
+tier, by NumPy and compiled code, with and without its error estimate, compared with two
+programs that do not use this package.
 
-The numbers of a point are those of five amplitudes. A few phases a cycle may happen to
-meet the kinks of dry friction well or badly: the direct tier and the other programs
-begin the cycle at several first phases, of which the bands show all.
+Each point is computed from five amplitudes. A few phases per cycle may happen to meet
+the kinks of dry friction well or badly. The direct tier and the other programs
+therefore begin the cycle at several first phases, and the bands show the range over
+these phases.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""The cost of a balance of forces: microseconds per sample against the size of a batch,
-by both backends, on one core and on all, compared with the usual loop of SciPy's; and
-time against links, directions and phases, with fitted exponents."""
+"""Cost of a balance of forces: microseconds per sample against the size of a batch, by
+both back ends, on one core and on all, compared with a loop of SciPy's fsolve; and time
+against links, directions and phases, with fitted exponents."""
 
 from __future__ import annotations
 

@@ -1,9 +1,10 @@
-"""The cost of effects: time of one cycle of the sandfish with effects switched on one
-at a time, over that with none.
+"""Cost of effects: computing time of one cycle of the sandfish with each effect
+switched on alone, over the time without effects.
 
-All from one run, seven amplitudes in a batch. Effects that depend on the past, or that
-give the body mass, compute the phases one after the other, and repeat the cycle until
-the motion repeats: that is the cost of the engine, not of the effect.
+All times are from one run, with seven amplitudes in a batch. If an effect depends on
+the past or gives the body mass, the phases are computed one after the other, and the
+cycle is repeated until the motion repeats. This is the cost of the engine, not of the
+effect.
 """
 
 from __future__ import annotations

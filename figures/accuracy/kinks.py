@@ -1,9 +1,9 @@
-"""Errors near kinks of the velocity: those of the linear connection and of its odd
+"""Errors near kinks of the velocity: misfit of the linear connection and of the odd
 harmonics, as maps over shape space.
 
-Left: the fraction of directions of alphadot for which some link stands still. Middle
-and right: the residual of the turning rate, rms over directions, by the first harmonic
-(the connection) and by all odd harmonics up to the 15th.
+Left: fraction of the directions of alphadot for which some link stands still. Middle
+and right: residual of the turning rate, rms over directions, for the first harmonic
+(the connection) and for all odd harmonics up to the 15th.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Programs of others against this package: CPU seconds of the same physical problems,
-in one run.
+"""Other programs compared with this package: CPU seconds for the same physical
+problems, in one run.
 
 `python -m figures.accuracy.others` prints rows of tables. Programs take turns, and the
-quickest of several calls counts. Two of them are no dependencies, and are left out
-where they are missing:
+quickest of several calls counts. Two of the programs are not dependencies of geomech.
+They are left out if they are not installed:
 
 - ElegansBot: `pip install elegansbot`
 - sysplotter: a copy of github.com/OSU-LRAM/GeometricSystemPlotter, whose folder the

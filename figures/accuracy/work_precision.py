@@ -1,4 +1,4 @@
-"""The cost of accuracy: error against time for every tier and setting of the built-in
+"""Work and precision: error against time for every tier and setting of the built-in
 scene."""
 
 from __future__ import annotations

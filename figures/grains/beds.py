@@ -1,21 +1,22 @@
 """Resistive force theory against beds of grains: swimmers, lift on bars, and drag after
 a reversal.
 
-Spheres of 6 mm with friction 0.3 and 1 MPa, in beds that differ by their seeds; error
-bars are standard errors over beds.
+The grains are spheres of 6 mm with friction 0.3 and 1 MPa, in beds that differ by their
+seeds. Error bars are standard errors over beds.
 
-(a) Displacement of three links, 162 x 12 mm at 25 mm depth, on circles, next to the
-tiers with the law of its flank and its ends, both measured in the same grains (band:
-one standard deviation of the flank's law): with ends whose axial force falls with the
-angle as on rods, with flat ends, and with a transient over two travels. (b) The same
-for the butterfly and a wave on seven links. (c) Lift over drag on bars without ends,
-next to the nine-term map, as it is and without tension. (d) Drag on the flank of a rod
-after its second reversal over that after a long travel, in grains (dots) and by the law
-of the effect `transient` (lines), fitted at 20 mm alone: 10 and 40 mm are predicted.
+(a) Displacement of three links, 162 x 12 mm at a depth of 25 mm, on circles, next to
+the tiers with the law of the flank and the ends, both measured in the same grains
+(band: one standard deviation of the law of the flank): with ends whose axial force
+falls with the angle as on rods, with flat ends, and with a transient over two travels.
+(b) The same for the butterfly and for a wave on seven links. (c) Lift over drag on bars
+without ends, next to the nine-term map, as it is and without tension. (d) Drag on the
+flank of a rod after its second reversal, over the drag after a long travel, in grains
+(dots) and by the law of the effect `transient` (lines). The law is fitted at 20 mm
+alone; 10 and 40 mm are predicted.
 
-Size, depth and friction of the robot of Fig. 11(e) are not in the paper's text, so this
-is no copy of it. The data are in `figures/grains/campaigns`; each file names the
-command that computed it.
+The size, depth and friction of the robot of Fig. 11(e) are not in the text of the
+paper, so this figure does not reproduce it. The data are in `figures/grains/campaigns`;
+each file names the command that computed it.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
-"""Plates and bars in beds of grains: stress by tilt on their leading faces, and the
-tilts at which the map of plates pulls.
+"""Plates and bars in beds of grains: stress on leading faces by tilt, and the tilts at
+which the map for plates pulls.
 
-Resistive force theory takes the stress on a part of a bar to be that on a plate of the
-same tilt at the same depth (Fig. 8(a)), and the map of plates pulls on faces that look
-up by more than 53 degrees. The beds are those of `figures.grains.beds`; bars and plates
-are towed level at 0.1 m/s, 16 mm deep. Stress is divided by the depth of each part,
-with the signs of `figures.paper.fig08a_rods`; errors are standard errors over three
-beds (two for the shell).
+Resistive force theory assumes that the stress on a part of a bar equals the stress on a
+plate of the same tilt at the same depth (Fig. 8(a)), and the map for plates pulls on
+faces that look up by more than 53 degrees. The beds are those of `figures.grains.beds`.
+Bars and plates are towed level at 0.1 m/s, 16 mm deep. Stress is divided by the depth
+of each part, with the signs of `figures.paper.fig08a_rods`. Errors are standard errors
+over three beds (two for the shell).
 
 Left and middle: normal and tangential stress on the rows of spheres of a round bar, and
 on the middle of the leading face of plates, without half a grain at the edges; open: on

@@ -1,9 +1,9 @@
 """Fig. 5(c): drag along and across a rod against its attack angle, in dry grains and in
 a viscous fluid.
 
-Forces are in units of the axial drag 2 k rho g r |z| per length. Dots: drag on a rod in
-a discrete-element bed of 6 mm grains (the sample short-rod-drag), with the granular law
-fitted to it.
+Forces are in units of the axial drag per length, 2 k rho g r |z|. Dots: drag on a rod
+in a discrete-element bed of 6 mm grains (the sample short-rod-drag), with the granular
+law that is fitted to it.
 """
 
 from __future__ import annotations

@@ -1,16 +1,17 @@
-"""Fig. 6(b): drag and lift stress on a plate against its depth, for some tilts and
+"""Fig. 6(b): drag and lift stress on a plate against its depth, for several tilts and
 directions of motion.
 
 The stress is the force over the area of the plate, sigma = F / A, against the depth of
-its middle. While the plate crosses the surface, the stress rises with the square of the
-submerged length. Once the plate is under (shaded for all tilts), it is
-|z| alpha(beta, gamma), a straight line through the origin, as Sec. II B states for all
-media, tilts and directions. On the way up (gamma < 0) grains hold a level plate down,
-in the generic map with a quarter of their resistance on the way down.
+its middle. While the plate crosses the surface, the stress grows with the square of the
+submerged length. Once the plate is below the surface (shaded for all tilts), the stress
+is |z| alpha(beta, gamma), a straight line through the origin, as Sec. II B states for
+all media, tilts and directions. On the way up (gamma < 0) the grains hold a level plate
+down; in the generic map their resistance is then a quarter of the resistance on the
+way down.
 
 The size of the plate, the medium, the angles and the greatest depth of the published
-panel are not in the text: assumed. The bottom of the bed, where the measured stress
-leaves the line, is not modelled.
+panel are not in the text and are assumed. The bottom of the bed, where the measured
+stress leaves the line, is not modelled.
 """
 
 from __future__ import annotations

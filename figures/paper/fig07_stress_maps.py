@@ -1,12 +1,13 @@
-"""Fig. 7(b) to (d): the nine coefficients of stress per depth, and the two maps that
-they give.
+"""Fig. 7(b) to (d): the nine coefficients of stress per unit depth, and the two stress
+maps that they define.
 
-The first panel shows the convention of plate, motion and stress (Fig. 6(a)). The second
-compares the generic set M0 with media whose nine coefficients are known, each divided
-by the medium's strength zeta: this one number takes one medium to the other. The maps
-are those of M0, hatched where the grains would pull on the leading face. Coefficients
-and zeta are those of `rft.terradynamics.plates.VERTICAL`; of the other media of the
-published panel only zeta is known.
+The first panel shows the convention for plate, motion and stress (Fig. 6(a)). The
+second panel compares the generic set M0 with media whose nine coefficients are known.
+Each set is divided by the strength zeta of the medium: this one number converts one
+medium into another. The maps are those of M0, hatched where the grains would pull on
+the leading face. The coefficients and zeta are from
+`rft.terradynamics.plates.VERTICAL`. For the other media of the published panel only
+zeta is known.
 """
 
 from __future__ import annotations

@@ -1,26 +1,27 @@
-"""Fig. 8(a): stress around a dragged cylinder by plates, and drag and lift on rods of
-four shapes against depth.
+"""Fig. 8(a): stress around a dragged cylinder as predicted by plates, and drag and lift
+on rods of four shapes against depth.
 
-(a) Resistive force theory takes the stress on a part of a rod to be that on a plate of
-the same tilt at the same depth; the text says that the two are nearly equal in
-discrete-element simulation. The line is the map for plates, the dots are the elements
-of a cylinder that moves level: normal stress, positive where the grains push, and
-tangential stress, positive from the bottom of the cylinder to its top. Tilts run from 0
-(the underside) through 90 degrees (the front) to 180 (the top). The published angle
-also runs from 0 to pi; that it starts at the underside is assumed. Its data are not in
-the text.
+(a) Resistive force theory assumes that the stress on a part of a rod equals the stress
+on a plate of the same tilt at the same depth; the text of the paper says that the two
+are nearly equal in discrete-element simulation. The line is the map for plates, and the
+dots are the elements of a cylinder that moves level. Normal stress is positive where
+the grains push, and tangential stress is positive from the bottom of the cylinder to
+its top. Tilts run from 0 (the underside) through 90 degrees (the front) to 180 (the
+top). The published angle also runs from 0 to pi; that it starts at the underside is
+assumed. Its data are not in the text.
 
-(b), (c) Drag and lift against the depth of the rod's axis. (d) Lift over drag deep
-down, next to the sign that was measured (Ding, Gravish and Goldman, Phys. Rev. Lett.
-106, 028001 (2011)): up on round and square rods, down on a half cylinder that lies on
-its flat side. The nine-term map gives upward lift on all of them: it pulls on faces
-that look up by more than 53 degrees, and this pull lifts. Without tension (dashed,
-open) the lift of the half cylinder falls to 0.04 of its drag, still not the measured
-sign. For that sign grains would have to press down on faces that look up, as they did
-on plates in that work. Undersides that slide along themselves carry no load here; they
-could only add lift.
+(b), (c) Drag and lift against the depth of the axis of the rod. (d) Lift over drag deep
+below the surface, next to the sign that was measured (Ding, Gravish and Goldman, Phys.
+Rev. Lett. 106, 028001 (2011)): up on round and square rods, down on a half cylinder
+that lies on its flat side. The nine-term map gives upward lift on all of them: it pulls
+on faces that look up by more than 53 degrees, and this pull lifts. Without tension
+(dashed, open) the lift of the half cylinder falls to 0.04 of its drag, which still does
+not have the measured sign. For that sign the grains would have to press down on faces
+that look up, as they did on plates in that work. Undersides that slide along themselves
+carry no load here; they could only add lift.
 
-Sizes of the rods and depths are assumed; medium: 3 mm glass, as in the text.
+The sizes of the rods and the depths are assumed. The medium is 3 mm glass, as in the
+text.
 """
 
 from __future__ import annotations

@@ -1,20 +1,20 @@
-"""Fig. 8(b): forces on a c-leg, a flat leg and a reversed c-leg that turn through loose
-poppy seeds about a fixed hub.
+"""Fig. 8(b): forces on a c-leg, a flat leg and a reversed c-leg that rotate through
+loose poppy seeds about a fixed hub.
 
-All three have the projected length 2 R with R = 3.8 cm, and turn at 2 pi rad/s;
-doubling that changes no force, in the text and here. At angle 0 a leg points straight
-down, and positive angles come later. The forces are not symmetric about it: a leg
-presses into the grains on its way down, and on its way up the grains, which are weaker
-there, hold it back. `asymmetry` measures the effect of the leg's curvature on this: the
-odd part of a force in the angle over its even part. The c-leg, whose bulge leads, meets
-the grains first, feels most lift and is pushed up until it has almost left the grains.
-The flat leg and the reversed one are pulled down at the end, and the reversed one,
-whose hollow leads, has its peaks after straight down.
+All three legs have the projected length 2 R with R = 3.8 cm and rotate at 2 pi rad/s;
+doubling the rate changes no force, in the text and here. At angle 0 a leg points
+straight down, and positive angles come later. The forces are not symmetric about angle
+0: a leg presses into the grains on its way down, and on its way up the grains, which
+are weaker there, hold it back. `asymmetry` measures the effect of the curvature of the
+leg on this: the odd part of a force in the angle over its even part. The c-leg, whose
+bulge leads, meets the grains first, feels the most lift and is pushed up until it has
+almost left the grains. The flat leg and the reversed leg are pulled down at the end.
+The reversed leg, whose hollow leads, has its peaks after it has passed straight down.
 
-The height of the hub (2 cm) and the width of the legs (2.5 cm) are not in the text:
-assumed. The dotted lines are for hubs a centimetre lower and higher. Forces are in
-proportion to the width. The measured curves are not in the text, either; it says that
-the peaks for the c-leg are within 10 % of those of the theory.
+The height of the hub (2 cm) and the width of the legs (2.5 cm) are not in the text and
+are assumed. The dotted lines are for hubs one centimetre lower and higher. Forces are
+proportional to the width. The measured curves are not in the text either; it says that
+the peaks for the c-leg are within 10 % of the theory.
 """
 
 from __future__ import annotations

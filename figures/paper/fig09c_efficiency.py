@@ -1,25 +1,26 @@
-"""Fig. 9(c): efficiency, slip and cost of a wave along the body against its curvature:
-sandfish in loose and close glass, snake in loose.
+"""Fig. 9(c): efficiency, slip and cost of a wave along the body against its curvature,
+for the sandfish in loose and close-packed glass beads and the snake in loose glass
+beads.
 
-Rows: progress per cycle over the arc length lambda_s of a wave; the same over its
-straight wavelength lambda; slip; mechanical cost of transport. Left against the mean
-relative curvature, right against A / lambda, which are one to one. Dots mark the best
-wave where there is one: efficiency and slip go on improving with the amplitude. Solid:
-the whole body, ends and yaw included. Dashed and dotted: the balance of force along an
-endless wave that slides along its curve, without and with the sandfish's head drag;
-dash-dot-dotted: an endless wave whose points move only sideways. Pale: the snake, its
-skin friction compared with that of an aluminium rod, 0.2, in place of the 0.15 in the
-caption of Fig. 5. Last row: the sandfish's body velocity through a cycle of its own
-wave (dash-dotted above).
+Rows from above: progress per cycle over the arc length lambda_s of a wave; progress per
+cycle over its straight wavelength lambda; slip; mechanical cost of transport. Left:
+against the mean relative curvature. Right: against A / lambda, which corresponds to it
+one to one. Dots mark the best wave where there is one: efficiency and slip go on
+improving with the amplitude. Solid: the whole body, ends and yaw included. Dashed and
+dotted: the balance of force along an endless wave that slides along its curve, without
+and with the head drag of the sandfish. Dash-dot-dotted: an endless wave whose points
+move only sideways. Pale: the snake, with its skin friction compared with the friction
+of an aluminium rod, 0.2, in place of the 0.15 in the caption of Fig. 5. Last row: the
+body velocity of the sandfish through a cycle of its wave (dash-dotted above).
 
 The paper defines undulation efficiency as progress "normalized by wavelength" and shows
-its optimum near the animal, A / lambda = 0.22. Its abscissa is curvature times
-lambda_s, the arc length of a wave, and read with that wavelength the efficiency of an
-endless wave in loose glass has its optimum at A / lambda = 0.21 (the whole sandfish's,
-with ends and yaw, is at 0.295, 0.343 in close glass). Read with the straight wavelength
-it has none: it grows with the amplitude. Maladen et al. (2011) found speed, not wave
-efficiency, largest near 0.2, and a wave efficiency of 0.5 for the animal; the whole
-sandfish has 0.503 here.
+its optimum near the animal, A / lambda = 0.22. The abscissa of the paper is curvature
+times lambda_s, the arc length of a wave. With lambda_s as the wavelength, the
+efficiency of an endless wave in loose glass has its optimum at A / lambda = 0.21; for
+the whole sandfish, with ends and yaw, it is at 0.295, and at 0.343 in close-packed
+glass. With the straight wavelength there is no optimum: the efficiency grows with the
+amplitude. Maladen et al. (2011) found that speed, not wave efficiency, is largest near
+0.2, and a wave efficiency of 0.5 for the animal; the whole sandfish has 0.503 here.
 """
 
 from __future__ import annotations

@@ -1,28 +1,30 @@
-"""Fig. 10: muscle activation of a swimming sandfish, predicted by the internal moment
-against the resistance of the sand.
+"""Fig. 10: muscle activation of a swimming sandfish, as predicted from the internal
+moment against the resistance of the sand.
 
-The sign of the moment tells the side that works, as in Sec. III C
-(`geomech.studies.mechanics.undulation.activation`). Lines are for a plain body at the
-animal's amplitude in loose glass; dashed in (d), with the sandfish's head drag.
+The sign of the moment tells which side works, as in Sec. III C
+(`geomech.studies.mechanics.undulation.activation`). Lines are for a plain body with the
+amplitude of the animal in loose glass beads; dashed lines in (d) include the head drag
+of the sandfish.
 
-(a) As Fig. 10(c): lines where the right side starts and stops to work, over the shaded
-part of the cycle in which curvature to the left falls. (b) As Fig. 10(b): curvature and
-moment at one place. The caption's place is x = 0.71 pi, from an origin it does not
-name; ours is 70 % of the way from head to tail. There the right side starts before the
-body is bent most to the left. (c) Phase by which activation is ahead of curvature: pi /
-2 where the side that works is the one that shortens, as at the middle of a body with
-equal halves fore and aft; more towards the tail, the advance that Sec. III C speaks of.
-(d) Speed of the wave of activation over that of curvature.
+(a) As Fig. 10(c): the lines show where the right side starts and stops working, over
+the shaded part of the cycle in which curvature to the left decreases. (b) As Fig.
+10(b): curvature and moment at one place. The caption gives the place x = 0.71 pi, from
+an origin that it does not name; here the place is 70 % of the way from head to tail.
+The right side starts there before the body is bent most to the left. (c) Phase by which
+activation is ahead of curvature. It is pi / 2 where the side that works is the side
+that shortens, as at the middle of a body with equal halves fore and aft. It is larger
+towards the tail; this is the advance that Sec. III C describes. (d) Speed of the wave
+of activation over the speed of the wave of curvature.
 
-The ratio is above 1: the wave of activation is the faster one, as Sec. III C says of
-nearly all undulating animals. The same section later calls its phase speed the smaller
-one, taking it for the inverse of a slope; the smaller quantity here is the slope of the
-lines in (a), time over place, not its inverse. From 0.5 to 1.8 waves the ratio falls,
-but not evenly: between 1 and 1.4 waves it is level to 5 % by the lines of onset and
-offset, with a shallow dip, and rises by 10 % by the first harmonic. As the lines are
-not straight, the ratio depends on the share of the body they are fitted over: from 0.2
-to 0.8 of it instead of 0.1 to 0.9 it is lower by up to 0.3, with the same dip. A
-comparison with electromyography would need the animals' data.
+The ratio is above 1: the wave of activation is faster, as Sec. III C says of nearly all
+undulating animals. The same section later calls its phase speed the smaller one,
+because it takes the speed for the inverse of a slope. The smaller quantity here is the
+slope of the lines in (a), time over place, not its inverse. From 0.5 to 1.8 waves the
+ratio falls, but not evenly: between 1 and 1.4 waves it is level to 5 % by the lines of
+onset and offset, with a shallow dip, and rises by 10 % by the first harmonic. As the
+lines are not straight, the ratio depends on the part of the body over which they are
+fitted: over 0.2 to 0.8 of the body instead of 0.1 to 0.9 it is lower by up to 0.3, with
+the same dip. A comparison with electromyography would need the data of the animals.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 by every tier.
 
 The tiers are the CCF of the uniform fit, the CCF adapted to the family of gaits, path
-integrals, and the force balance.
+integrals, and the balance of forces.
 """
 
 from __future__ import annotations

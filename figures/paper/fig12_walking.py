@@ -1,11 +1,11 @@
-"""Fig. 12(b), (d) and (f): forward speed of Xplorer against time, its mean speed
-against the curvature of its legs at 1 to 4 Hz, and that of SandBot against the air flow
-through the grains at 2 to 8 rad/s.
+"""Fig. 12(b), (d) and (f): forward speed of Xplorer against time, mean speed of Xplorer
+against the curvature of its legs at 1 to 4 Hz, and mean speed of SandBot against the
+flow of air through the grains at 2 to 8 rad/s.
 
-The paper gives mass and length of the robots and no other size: the others are assumed
-(the built-in scenes say which), and so is the air speed of fluidisation. Only the
-trends are claimed, not the numbers; `figures.robots.walking_sensitivity` shows which
-assumptions these depend on.
+The paper gives the mass and the length of the robots and no other size. The other sizes
+are assumed (the built-in scenes say which), and so is the air speed of fluidisation.
+Only the trends are claimed, not the numbers; `figures.robots.walking_sensitivity` shows
+on which assumptions the numbers depend.
 """
 
 from __future__ import annotations

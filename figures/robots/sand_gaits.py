@@ -1,9 +1,9 @@
 """A gait for sand: a hexapod in MuJoCo learns to walk in loose poppy seeds and on a
 hard floor, and each gait is tried on both.
 
-A search by the cross-entropy method over frequency, duty, sweep and middle angle of a
-tripod's clock, a few hundred walks of three seconds on each ground, all in
-`mujoco.batch.Batch` (MuJoCo 4). All sizes are assumed.
+The cross-entropy method searches over the frequency, duty, sweep and middle angle of
+the clock of a tripod gait, with a few hundred walks of three seconds on each ground,
+all in `mujoco.batch.Batch` (MuJoCo 4). All sizes are assumed.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
-"""The engine of three dimensions: its errors by steps and elements, and its speeds
-against the planar engine's. Needs MuJoCo.
+"""The engine of three dimensions: errors against steps and elements, and speeds
+compared with the planar engine. The figure needs MuJoCo.
 
-Xplorer's progress in a stride of its limit cycle at 2 Hz, against the time steps of a
-cycle, of which each is 16 of MuJoCo's, and against the elements of a leg. The speeds of
-the planar engine are those of 96 steps and 48 elements.
+The errors are those of the progress of Xplorer in one stride of its limit cycle at 2
+Hz, against the time steps per cycle, each of which is 16 steps of MuJoCo, and against
+the elements of a leg. The speeds of the planar engine are computed with 96 steps and 48
+elements.
 """
 
 from __future__ import annotations

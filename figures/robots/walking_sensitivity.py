@@ -1,12 +1,13 @@
-"""The sensitivity of the speeds of walking robots to assumptions: every size that the
-paper does not give, one at a time, times 0.7 and 1.4, and two choices of the model.
+"""Sensitivity of walking robots to assumptions: speed of the robots when each size that
+the paper does not give is multiplied by 0.7 and by 1.4, one at a time, and for two
+choices of the model.
 
-The choices are whether grains pull on faces, as in their map, and whether the belly is
-a closed box, on whose bottom and front grains push where these lead, or an open sheet,
-its bottom alone, on either side of which grains push.
+The first choice is whether grains pull on faces, as in their map. The second is whether
+the belly is a closed box, on whose bottom and front grains push where these lead, or an
+open sheet, its bottom alone, on either side of which grains push.
 
-Above, the mean speed of Xplorer with c-legs, flat and reversed ones at 2 Hz; below,
-that of SandBot at 4 rad/s in still grains and with air at 0.6 of fluidisation.
+Above: mean speed of Xplorer with c-legs, flat legs and reversed legs at 2 Hz. Below:
+mean speed of SandBot at 4 rad/s in still grains and with air at 0.6 of fluidisation.
 """
 
 from __future__ import annotations

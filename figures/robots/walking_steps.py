@@ -1,11 +1,11 @@
-"""The step-size study of the planar engine: Xplorer's progress from rest at 1 and 3 Hz
-by implicit and by explicit steps.
+"""Step size of the planar engine: progress of Xplorer from rest at 1 and 3 Hz, by
+implicit and by explicit steps.
 
-The law of stress jumps at rest like dry friction, and the numerics round it at a set
-speed. Explicit steps (Heun's, also of order 2) chatter across the jump until they
-resolve the rounding; implicit ones need not resolve it. Below, the residual of the
-balance of energy: work of the motors - loss in the ground - change of the body's
-energy.
+The law of stress jumps at rest like dry friction, and the numerics round it at a given
+speed. Explicit steps (Heun's method, also of order 2) chatter across the jump until
+they resolve the rounding; implicit steps need not resolve it. Below: residual of the
+balance of energy, which is the work of the motors minus the loss in the ground minus
+the change of the energy of the body.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""A strip of pictures: the butterfly gait in loose glass, on the ground and on the map
-of the CCF."""
+"""Filmstrip of a gait: six shapes of the butterfly gait in loose glass beads, along the
+track of the body and on the CCF map."""
 
 from __future__ import annotations
 

@@ -1,10 +1,11 @@
-"""The effect of the body frame on the area tier in loose glass: mean, middle-link and
-minimum-perturbation frame against the force balance.
+"""Body frames: the area tier in loose glass beads, in the mean, middle-link and
+minimum-perturbation frames, compared with the balance of forces.
 
-Above: net distance per cycle, by the area under the CCF in each frame and by the force
-balance, which is the same in all. Below: distance of the area tier from the force
-balance in its own frame, and, dotted, of the path tier, which integrates the same
-fitted connection along the gait: no frame removes its error.
+Above: net distance per cycle by the area under the CCF in each frame, and by the
+balance of forces, which is the same in all frames. Below: distance of the area tier
+from the balance of forces in the same frame and, dotted, distance of the path tier,
+which integrates the same fitted connection along the gait. No frame removes the error
+of the path tier.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """A measured gait: sixty noisy cycles of a three-link swimmer in a viscous fluid, the
-connection near their mean by regression, and the displacement that it predicts.
+connection near their mean gait by regression, and the displacement that it predicts.
 
 The method is that of Bittner, Hatton and Revzen, Nonlinear Dynamics 94, 1933 (2018).
-The log is computed from the swimmer's velocity, so that the truth is known: joints
-deviate by 0.05 rad from the gait, and each row has noise of 1e-3 rad and 1e-3 BL.
+The log is computed from the velocity of the swimmer, so that the truth is known. The
+joint angles deviate from the gait by 0.05 rad, and each row has noise of 1e-3 rad and
+1e-3 BL.
 """
 
 from __future__ import annotations

@@ -1,10 +1,9 @@
-"""Midlines of a trial: the kinematics of an undulator in glass beads with intervals,
-and the speed that the balance of forces predicts for its shapes.
+"""Midlines of a trial: the kinematics of an undulating body in glass beads, with
+confidence intervals, and the speed that the balance of forces predicts for its shapes.
 
-The trial is computed in loose beads, so that the truth is known: 30 points with 1 % of
-noise, a swing and a number of waves that vary by 5 %, and a frequency that varies by 2
-%.
-The prediction is for close beads.
+The trial is computed in loose beads, so that the truth is known. It has 30 points with
+1 % of noise, a swing of the headings and a number of waves that vary by 5 %, and a
+frequency that varies by 2 %. The prediction is for close-packed beads.
 """
 
 from __future__ import annotations

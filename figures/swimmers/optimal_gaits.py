@@ -1,20 +1,21 @@
-"""Optimal gaits of the three-link swimmer in a viscous fluid and in loose glass: for
-displacement, and for efficiency.
+"""Optimal gaits: the strokes of the three-link swimmer in a viscous fluid and in loose
+glass beads that are best for displacement and for efficiency.
 
 The optima in sand are larger and yield more, for two reasons. First, drag in sand does
 not grow with speed: a link that moves slowly holds as firmly as one that sweeps. Wide
-strokes pay, in which one end sweeps while the rest is an anchor, and a fast sweep costs
-no more work than a slow one. With drag like |v|^p and the fluid's ratio of drag across
-to drag along, 2, the stroke for displacement reaches 1.9 rad and 0.10 BL at p = 1, and
-the limit of 2.5 rad and 0.23 BL at p = 0.3 and 0.37 BL at p = 0; the stroke for
-efficiency reaches 1.44 rad at p = 1, and the limit at the others. Second, at small slip
-sand's drag across is 1 + C / tan gamma0 = 8.3 times that along. That alone increases
-the displacement of a stroke and shrinks the loop: a fluid of that ratio has 0.40 BL at
-1.76 rad.
+strokes therefore pay, in which one end sweeps while the rest is an anchor, and a fast
+sweep costs no more work than a slow one. If drag is proportional to |v|^p, with the
+fluid's ratio 2 of drag across to drag along, the stroke for displacement reaches 1.9
+rad and 0.10 BL at p = 1. It reaches the limit of 2.5 rad at smaller p, with 0.23 BL at
+p = 0.3 and 0.37 BL at p = 0. The stroke for efficiency reaches 1.44 rad at p = 1 and
+the limit at the other values. Second, at small slip the drag of sand across is 1 + C /
+tan gamma0 = 8.3 times the drag along. This ratio alone increases the displacement of a
+stroke and shrinks the loop: a fluid with the same ratio has 0.40 BL at 1.76 rad.
 
-In the fluid the stroke for displacement follows the zero line of the CCF, and that for
-efficiency cuts the far ends off, where little area is left for much path. In sand the
-CCF is that of a least-squares connection, which does not give all the displacement.
+In the fluid the stroke for displacement follows the zero line of the CCF. The stroke
+for efficiency cuts off the far ends, which add little area for much path. In sand the
+CCF is computed from a least-squares connection, which does not give all of the
+displacement.
 """
 
 from __future__ import annotations

@@ -1,12 +1,13 @@
-"""The loss of a sandfish by the transient response of the ground (paper Sec. IV A).
+"""Transient response of the ground: displacement and forward velocity of a sandfish
+with and without it (paper Sec. IV A).
 
-Resistive force theory takes the drag to be steady at once. After a reversal the grains
-need some travel, by the paper about a fifth of the amplitude of an oscillating rod, and
-the theory exceeds discrete-element simulation by up to 30 %. Left: net displacement
-over that without the effect, against the travel across over the wave's amplitude A,
-with the shares of the drag that are there at once in beds of grains
-(`figures.grains.beds`); there the travel is 2.8 diameters of a rod. Right: forward
-velocity through a cycle.
+Resistive force theory assumes that drag is steady at once. After a reversal the grains
+need some travel, according to the paper about a fifth of the amplitude of an
+oscillating rod, and the theory exceeds discrete-element simulation by up to 30 %. Left:
+ratio of the net displacement with the effect to the displacement without it, against
+the travel across over the amplitude A of the wave. The shares of the drag that act at
+once are those of beds of grains (`figures.grains.beds`), where the travel is 2.8
+diameters of a rod. Right: forward velocity through a cycle.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
-"""Grains and ground: their effects on the force on the c-leg of Fig. 8(b) in loose
-poppy seeds.
+"""Effects of the ground: force on the c-leg of Fig. 8(b) in loose poppy seeds with
+grain inertia, with air, on a slope, and in disturbed ground.
 
-Left: the force that the inertia of grains adds over the force without it, both rms over
-the turn, against the rate, for lambda of 1 to 4; experiments notice it above some 230
-rpm (dashed). Middle: peak lift over its value in still, level ground, against air speed
-over the speed of fluidisation, and against slope over the angle of repose, for a leg
-that sweeps down the slope and one that sweeps up. Right: lift against angle where an
-earlier intrusion has disturbed the ground in front of the leg.
+Left: force that the inertia of the grains adds, over the force without it, both rms
+over the turn, against the rate, for lambda of 1 to 4; experiments notice it above about
+230 rpm (dashed). Middle: peak lift over its value in still, level ground, against air
+speed over the speed of fluidisation, and against slope over the angle of repose, for a
+leg that sweeps down the slope and one that sweeps up. Right: lift against angle where
+an earlier intrusion has disturbed the ground in front of the leg.
 """
 
 from __future__ import annotations

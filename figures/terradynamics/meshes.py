@@ -1,10 +1,11 @@
-"""Bodies of three dimensions by the law of Agarwal, Goldman and Kamrin (2023).
+"""Bodies in three dimensions: stress and force on meshes by the law of Agarwal, Goldman
+and Kamrin (2023), and their errors.
 
-Top: stress on meshes where the force is largest, as `geomech intrude` draws it. Bottom:
-error of the force on a sphere and a cylinder against the number of triangles, deep and
-half out of the ground; the law in the vertical plane (psi = 0) compared with the
-generic map of two dimensions, both over their stress on a plate pushed straight down,
-for plates of all tilts.
+Top: stress on meshes at the time when the force is largest, as `geomech intrude` draws
+it. Bottom: error of the force on a sphere and a cylinder against the number of
+triangles, deep below the surface and half out of the ground; and the law in the
+vertical plane (psi = 0) compared with the generic map of two dimensions, both over
+their stress on a plate that is pushed straight down, for plates of all tilts.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""Screws in sand by the law of three dimensions: the thrust of one against slip, and
-the paths of craft on two of them.
+"""Screws in sand: thrust of a screw against slip by the law of three dimensions, and
+the paths of craft on two screws.
 
-The craft is that of the built-in scene ``screws``; it and its sand are assumed. Lines
-are the balance of the mean forces over a turn, without inertia
-(`rft.terradynamics.walking.cruise`); circles and paths are MuJoCo's. The axes of single
-screws are at heights over the surface, above it, at it and below it.
+The craft is that of the built-in scene ``screws``; the craft and its sand are assumed.
+Lines are the balance of the mean forces over a turn, without inertia
+(`rft.terradynamics.walking.cruise`). Circles and paths are computed with MuJoCo. The
+axes of single screws are above the surface, at it and below it.
 """
 
 from __future__ import annotations

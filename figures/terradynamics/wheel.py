@@ -1,9 +1,9 @@
 """A wheel on sand: drawbar pull and sinkage against slip, slow and fast, with and
-without the inertia of grains (Sec. IV C).
+without the inertia of the grains (Sec. IV C).
 
-Without inertia the law does not depend on how fast the wheel turns. A wheel of 0.1 m
-under 20 N in loose poppy seeds, all sizes assumed; lambda = 1 (published values are 1
-to 4) and 638 kg/m^3 (Agarwal et al. 2021).
+Without inertia the forces do not depend on how fast the wheel turns. The wheel of 0.1 m
+carries 20 N in loose poppy seeds; all sizes are assumed. lambda = 1 (published values
+are 1 to 4) and the density is 638 kg/m^3 (Agarwal et al. 2021).
 """
 
 from __future__ import annotations

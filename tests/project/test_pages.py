@@ -133,7 +133,8 @@ def test_commands_on_all_pages_exist_with_their_options_and_names():
 # They draw for seconds each: commands.txt has some; their options and names are looked
 # up above.
 DRAWN = {"run", "ccf", "trajectory"}
-TYPED = {" ".join(line): line for line in commands(README) if len(line) > 1 and line[0] not in DRAWN
+FIRST = README, SITE / "start.md"  # pages for somebody who types a first command
+TYPED = {" ".join(line): line for page in FIRST for line in commands(page) if len(line) > 1 and line[0] not in DRAWN
          and not any(re.search(r"\b[A-Z]{3,}\b", word) for word in line)}  # fmt: skip
 
 
@@ -142,7 +143,7 @@ TYPED = {" ".join(line): line for line in commands(README) if len(line) > 1 and 
     [line for text, line in TYPED.items() if text not in read_commands()],
     ids=" ".join,
 )
-def test_what_the_readme_says_to_type_runs(line, tmp_path, monkeypatch):
+def test_what_readme_and_start_say_to_type_runs(line, tmp_path, monkeypatch):
     """What is no line of data/commands.txt."""
     monkeypatch.chdir(tmp_path)
     code, _, err = geomech(*line)
