@@ -1,4 +1,4 @@
-"""The table of validation: numbers that geomech gives beside those of others, computed
+"""The table of the validation page: numbers of geomech beside published ones, computed
 while the site is built.
 
 `python .docs/made/validation.py` prints the table alone.
@@ -23,6 +23,9 @@ from geomech.mathematics.tiers.area import area
 from geomech.studies.mechanics import undulation
 from rft.terradynamics.plates import VERTICAL
 
+SWIMMER = "viscous three-link swimmer"
+CLOSED = "the connection in closed form by sympy, integrated by SciPy to 1e-12"
+
 
 def table() -> str:
     """Return the rows of all checks as a Markdown table."""
@@ -36,7 +39,11 @@ def table() -> str:
         for check, source, ours, theirs in rows
     ]
     return "\n".join(
-        ["| check | source | geomech | source says |", "|---|---|---|---|", *lines]
+        [
+            "| quantity | reference | geomech | reference value |",
+            "|---|---|---|---|",
+            *lines,
+        ]
     )
 
 
@@ -49,24 +56,25 @@ def viscous_geometry():
     field = dataclasses.replace(
         study.fitted, A=minimum_perturbation(study.fitted).connection(study.fitted)
     )
-    source = "reference value of an earlier, coarser discretisation, 31 x 31"
+    source = "an earlier computation on a coarser discretisation, 31 x 31"
     curvature = ccf(field)
     yield (
-        "viscous three-link swimmer, minimum-perturbation frame: CCF_x(0, 0)",
+        f"{SWIMMER}, minimum-perturbation frame: CCF_x(0, 0)",
         source,
         _(curvature([0.0, 0.0])[0], 5),
         "-0.0204",
     )
     moved = area(curvature, Circle(), [1.0])[0]
     yield (
-        "the same: area integral over the circle of 1 rad",
+        f"{SWIMMER}, minimum-perturbation frame: area integral over the circle of"
+        " 1 rad (BL)",
         source,
         _(np.hypot(*moved[:2]), 4),
         "0.0510",
     )
     net = study.poses("direct", Circle(), [1.0])[0]
     yield (
-        "the same circle: net distance by the balance of forces",
+        f"{SWIMMER}: net distance on the circle of 1 rad by the balance of forces (BL)",
         CLOSED,
         _(np.hypot(*net[:2]), 6),
         _(closed_distance(), 6),
@@ -79,30 +87,28 @@ def viscous_cost():
     study = geomech.Study(geomech.load("three-link-viscous")).tables
     M = study.metric.field([0.0, 0.0])
     source = (
-        "metric in the system that sysplotter saves; 16/2187 and 11/2187 in closed form"
+        "metric in the system that sysplotter saves; the closed forms are 16/2187 and"
+        " 11/2187"
     )
     yield (
-        "the same: dissipation metric M(0, 0), diagonal entry",
+        f"{SWIMMER}: dissipation metric M(0, 0), diagonal entry",
         source,
         _(M.ravel()[0], 7),
         "0.0073160",
     )
     yield (
-        "the same: dissipation metric M(0, 0), off-diagonal entry",
+        f"{SWIMMER}: dissipation metric M(0, 0), off-diagonal entry",
         source,
         _(M.ravel()[1], 7),
         "0.0050297",
     )
     length = metric.path_length(study.metric.norm, Circle(), [1.0])[0]
     yield (
-        "the same: path length of the circle of 1 rad",
+        f"{SWIMMER}: path length of the circle of 1 rad",
         CLOSED,
         _(length, 6),
         _(closed_path_length(), 6),
     )
-
-
-CLOSED = "connection in closed form by sympy, integrated by SciPy to 1e-12"
 
 
 def closed_distance() -> float:
@@ -153,8 +159,8 @@ def strokes():
     for what, value in published.items():
         best = geomech.optimise(scene, what.partition(" ")[0])
         yield (
-            f"the same: best stroke for {what}",
-            "Ramasamy and Hatton, published optimum",
+            f"{SWIMMER}: best stroke for {what}",
+            "the optimum published by Ramasamy and Hatton",
             _(float(best["value"].values), 4),
             value,
         )
@@ -162,7 +168,7 @@ def strokes():
 
 def stress():
     """Yield the generic stress map at published angles."""
-    source = "Li, Zhang and Goldman, Science 339, 1408 (2013), Table S2: check value for its coefficients"
+    source = "Li, Zhang and Goldman, Science 339, 1408 (2013), Table S2: check values of the coefficients"
     wanted = {(0, 90): (0.0, 1.0), (0, -90): (0.0, -0.25), (90, 0): (0.37, 0.037), (0, 0): (0.136, 0.375),
               (45, 45): (0.3595, 0.5702)}  # fmt: skip
     for (beta, gamma), (x, z) in wanted.items():
@@ -176,12 +182,12 @@ def waves():
     medium = geomech.media.CATALOGUE["glass-0.3mm-surface"].medium
     headings = np.radians(48.4) * np.cos(2 * np.pi * (np.arange(2000) + 0.5) / 2000)
     speed = undulation.endless_efficiency(medium, headings) * np.cos(headings).mean()
-    yield ("snake on the surface of 0.3 mm glass, endless wave of 48.4 degrees: speed over speed along its track",
-           "animals of Schiebel et al., eLife 9, e51412 (2020)", _(speed, 3), "0.81 (0.74 to 0.89)")  # fmt: skip
+    yield ("snake on the surface of 0.3 mm glass, endless wave of 48.4 degrees: speed over its speed along the track",
+           "animals, Schiebel et al., eLife 9, e51412 (2020)", _(speed, 3), "0.81 (0.74 to 0.89)")  # fmt: skip
     study = geomech.Study(geomech.load("seven-link-wave")).tables
     net = np.hypot(*study.poses("direct")[:2])
-    yield ("robot of seven segments in 6 mm grains: displacement a cycle over the length of its wave, 0.757 BL",
-           "experiment of Maladen et al. (2011)", _(net / 0.757, 2), "0.34 +- 0.02")  # fmt: skip
+    yield ("robot of seven segments in 6 mm grains: displacement per cycle over the length of its wave, 0.757 BL",
+           "experiment, Maladen et al. (2011)", _(net / 0.757, 2), "0.34 +- 0.02")  # fmt: skip
 
 
 def _(value: float, digits: int) -> str:
