@@ -300,3 +300,30 @@ WCON = {"units": {"t": "s", "x": "mm", "y": "mm"}, "data": [{"id": "1", "t": [0.
 def test_files_of_other_programs_are_known(name, raw, said, tmp_path):
     with pytest.raises(Refusal, match=said):
         reader.read(written(tmp_path / name, raw))
+
+
+# SI prefixes, and the words of one unit.
+PREFIXES = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6, "": 1.0}
+BASES = {
+    "s sec secs seconds": 1.0,
+    "min": 60.0,
+    "m metres meters N newton rad radians": 1.0,
+    "deg degree degrees °": np.pi / 180,
+}
+FACTORS = {word: factor for words, factor in BASES.items() for word in words.split()}
+
+
+@pytest.mark.parametrize("kind", rows.UNITS)
+def test_units_are_their_prefix_times_the_unit_of_the_si(kind):
+    def factor(unit):
+        if "/" in unit:
+            above, below = unit.split("/")
+            return factor(above) / factor(below)
+        if unit[-1] in "23":
+            return factor(unit[:-1]) ** int(unit[-1])
+        if unit in FACTORS:
+            return FACTORS[unit]
+        return PREFIXES[unit[0]] * FACTORS[unit[1:]]
+
+    for unit, value in rows.UNITS[kind].items():
+        assert value == pytest.approx(factor(unit), rel=1e-15), unit

@@ -402,6 +402,10 @@ def test_deeplabcut_counts_frames_and_pixels_downwards_and_scores_its_points(
     np.testing.assert_allclose(trial.t, exact.t)
     file.write_text(deeplabcut(exact, 0.3))
     assert np.isnan(reader.read(file).points).all()
+    _, without_scorer = deeplabcut(exact).split("\n", 1)
+    file.write_text(without_scorer)
+    same = reader.read(file, fps=30.0, scale=0.4)
+    np.testing.assert_array_equal(same.points, trial.points)
 
 
 LONG = "\n".join(["t,point,x,y", *(f"{k // 5},{k % 5 + 1},{k},{k}" for k in range(60))])

@@ -255,6 +255,8 @@ def test_limits_hold_and_are_named(short):
     assert np.abs(short.gait.cycle(2000)[0]).max() <= 1.2 + 1e-9
     circle = SceneTables(viscous()).poses("direct", Circle(), [1.2])[0]
     assert short.value > np.hypot(*circle[:2])
+    told = {variable.name: variable.values for variable in variables.loop(short)}
+    np.testing.assert_allclose(told["joint_limits"], [[-1.2, -1.2], [1.2, 1.2]])
 
 
 @pytest.mark.parametrize(

@@ -408,23 +408,26 @@ JUMPING = Walker(XPLORER.robot, Tripod(1.0), StressMap(zeta=0.3, grazing=0.0))
 
 
 def test_without_a_limit_cycle_the_mean_of_four_cycles_counts():
-    """Of a walk whose limit cycle a push would leave for good."""
-    strides = batch_strides([JUMPING], Fineness(steps=12, elements=4))
-    state = walk_from_rest(strides, np.ones(1)).state
+    """Of two walks whose limit cycles a push would leave for good."""
+    denser = dataclasses.replace(JUMPING, stress=StressMap(zeta=0.6, grazing=0.0))
+    strides = batch_strides([JUMPING, denser], Fineness(steps=12, elements=4))
+    state = walk_from_rest(strides, np.ones(2)).state
     first = state = state._replace(defect=state.defect + 0.5)
-    unstable = Limit(state, 1, -1.5 * np.eye(5), np.zeros(5))
-    found = limit_cycles(strides, [unstable])
-    places = [state.pose[0, 0]]
+    limits = [
+        Limit(state.take([k]), 1, -1.5 * np.eye(5), np.zeros(5)) for k in range(2)
+    ]
+    found = limit_cycles(strides, limits)
+    places = [state.pose[:, 0]]
     for k in range(8):
-        state = strides.run(state, k, np.zeros(1, int))[1].take(-1)
-        places.append(state.pose[0, 0])
-    moved = np.diff(places[::2]) / 2
-    assert not found.periodic[0]
-    assert found.progress[0] == pytest.approx(moved.mean())
-    per_length = (state.defect - first.defect)[0] / 8 / strides.frequency[0]
-    assert per_length > 0
-    assert found.unsolved_error[0] == pytest.approx(per_length * strides.period)
-    assert found.drift[0] == pytest.approx(np.ptp(moved))
+        state = strides.run(state, k, np.arange(2))[1].take(-1)
+        places.append(state.pose[:, 0])
+    moved = np.diff(places[::2], axis=0) / 2
+    assert not found.periodic.any()
+    np.testing.assert_allclose(found.progress, moved.mean(0), rtol=1e-6)
+    per_length = (state.defect - first.defect) / 8 / strides.frequency
+    assert (per_length > 0).all()
+    np.testing.assert_allclose(found.unsolved_error, per_length * strides.period)
+    np.testing.assert_allclose(found.drift, np.ptp(moved, axis=0), rtol=1e-6)
 
 
 FAST_SANDBOT = dataclasses.replace(
