@@ -61,7 +61,7 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech.results.measured import fitted_gait as fitted_gait
     from geomech.results.scenes import best_scene as best_scene
     from geomech.results.scenes import fitted_medium as fitted_medium
-    from geomech.run import workers as workers
+    from geomech.runs import workers as workers
     from geomech.scenes import Numerics as Numerics
     from geomech.scenes import Scene as Scene
     from geomech.scenes import load as load
@@ -94,7 +94,7 @@ _MODULES = {  # by their names here; none is imported before its first use
     **{name: f"rft.{name}" for name in ("bodies", "effects")},
     "media": "rft.laws",
     "undulation": "geomech.studies.mechanics.undulation",
-    "workers": "geomech.run.workers",
+    "workers": "geomech.runs.workers",
 }
 _OBJECTS = {
     **dict.fromkeys(

@@ -25,7 +25,7 @@ PACKAGES = {
         "geomech.studies.measured",
         "geomech.studies.mechanics.undulation",
         "geomech.plots",
-        "geomech.run.workers",
+        "geomech.runs.workers",
     ],
     "Geometry of any velocity": [
         "geomech.mathematics.geometry.connection",

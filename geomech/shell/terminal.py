@@ -23,8 +23,8 @@ from typing import Any
 import typer
 
 from geomech.core.errors import Note
-from geomech.run import THREAD_VARIABLES
-from geomech.run.progress import progress
+from geomech.runs import THREAD_VARIABLES
+from geomech.runs.progress import progress
 from rft.core.refusal import Refusal, line, printable, spell_arguments
 
 __all__ = ["Stopped", "exit_code", "progress", "report", "show", "stoppable"]

@@ -19,7 +19,7 @@ from geomech.mathematics.tiers.area import AREA
 from geomech.mathematics.tiers.fitted import axes as field_axes
 from geomech.mathematics.tiers.fitted import is_too_large
 from geomech.mathematics.tiers.path import PATH
-from geomech.run.cost import Cost
+from geomech.runs.cost import Cost
 from geomech.scenes.model import Scene
 from geomech.studies.available import default_tiers
 from geomech.studies.estimates import effort

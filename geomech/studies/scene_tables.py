@@ -31,7 +31,7 @@ from geomech.mathematics.systems.framed import NAME as MINIMUM_PERTURBATION
 from geomech.mathematics.systems.framed import in_frame
 from geomech.mathematics.tiers import TIERS, fitted, harmonic
 from geomech.mathematics.tiers.base import Plan, Table, Tier, in_groups
-from geomech.run.progress import progress as shown_progress
+from geomech.runs.progress import progress as shown_progress
 from geomech.scenes.frames import framed
 from geomech.scenes.model import Scene, frequency_of
 from geomech.studies.available import available_tiers, default_tiers

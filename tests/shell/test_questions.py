@@ -25,7 +25,7 @@ from geomech.core.variables import Result, Variable
 from geomech.io import results as io
 from geomech.questions.shared import base
 from geomech.results import files
-from geomech.run.digest import digest
+from geomech.runs.digest import digest
 from geomech.shell import cli
 from geomech.shell.command import declaration, figure, parameters
 from rft.core.refusal import Refusal

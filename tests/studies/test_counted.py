@@ -15,7 +15,7 @@ from geomech.questions.swimmers.accuracy import Accuracy
 from geomech.questions.swimmers.ccf import Ccf
 from geomech.questions.swimmers.run import Run
 from geomech.questions.swimmers.sweep import Sweep
-from geomech.run.cost import BASE
+from geomech.runs.cost import BASE
 from geomech.scenes import Scene
 from geomech.studies.estimates import cost, effort
 from geomech.studies.mechanics import motion

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from geomech.core.variables import Result, Variable
-from geomech.run.cost import BASE, Cost, TooLong, duration
-from geomech.run.runner import runner
-from geomech.run.store import cache_folder
+from geomech.runs.cost import BASE, Cost, TooLong, duration
+from geomech.runs.runner import runner
+from geomech.runs.store import cache_folder
 from geomech.studies.terradynamics.calibration import fit_variables
 from rft.core.checks import in_range, is_number, is_whole
 from rft.core.refusal import Refusal, require

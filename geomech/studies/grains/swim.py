@@ -14,7 +14,7 @@ import numpy as np
 from geomech.core.variables import Result, Variable
 from geomech.mathematics.systems.base import body_size
 from geomech.mathematics.systems.swimmer import Swimmer
-from geomech.run.backend import prefer_backend
+from geomech.runs.backend import prefer_backend
 from geomech.scenes.model import Scene
 from geomech.studies.grains.drag import GrainSteps, grain_cost, store_folder
 from geomech.studies.scene_tables import SceneTables

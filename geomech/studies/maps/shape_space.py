@@ -21,7 +21,7 @@ from geomech.mathematics.systems.capabilities import stored_table
 from geomech.mathematics.tiers.area import AREA
 from geomech.mathematics.tiers.fitted import finest_grid, refuse
 from geomech.mathematics.tiers.harmonic import is_looked_up
-from geomech.run.cost import Cost
+from geomech.runs.cost import Cost
 from geomech.scenes.model import Scene
 from geomech.studies.displacement.variables import COMPONENTS, POSE
 from geomech.studies.estimates.cost import (

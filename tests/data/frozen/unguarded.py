@@ -4,7 +4,7 @@
 import rolling
 
 import geomech
-from geomech.run import pending
+from geomech.runs import pending
 
 pending.WORTH_PROCESSES = 0.0  # s
 print("once")

@@ -14,9 +14,9 @@ import contextlib
 import dataclasses
 from collections.abc import Iterator
 
-from geomech.run.backend import at_most, cores, fastest
-from geomech.run.executors import Cluster, Executor, Processes
-from geomech.run.runner import runner, use_runner
+from geomech.runs.backend import at_most, cores, fastest
+from geomech.runs.executors import Cluster, Executor, Processes
+from geomech.runs.runner import runner, use_runner
 from rft.core.checks import in_range
 from rft.core.refusal import Refusal
 
