@@ -25,7 +25,7 @@ COMMAND = """
 import signal, sys
 for number in (signal.SIGINT, signal.SIGTERM):
     signal.signal(number, signal.SIG_DFL)
-from geomech import connection
+from geomech.mathematics.geometry import connection
 from geomech.shell import cli
 from geomech.runs import pending, store
 from geomech.runs import runner as runners
