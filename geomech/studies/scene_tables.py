@@ -208,7 +208,7 @@ class SceneTables:
         shape: ArrayLike | None = None,
         progress: Callable | None = None,
     ) -> Plane:
-        """Return a plane of shape space in which two joints move, counted from 0,
+        """Return a plane of shape space in which two joints move, counted from 1,
         through a shape or the gait's middle: the CCF of that pair, without a field of
         all joints (`geomech.mathematics.geometry.representations.plane`)."""
         scene = self.scene

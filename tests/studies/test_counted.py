@@ -134,7 +134,7 @@ TABLES = {
     "even part": (cost.even_part_jobs, lambda tables: tables.even_part),
     "plane": (
         lambda s: cost.plane_jobs(s, [(0, 1)], [s.gait.middle]),
-        lambda tables: tables.plane((0, 1)),
+        lambda tables: tables.plane((1, 2)),
     ),
 }
 
