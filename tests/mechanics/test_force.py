@@ -29,7 +29,9 @@ def test_the_force_on_a_link_is_the_integral_of_equations_2_and_3(rotation, head
     options = {"heading": heading, "length": 0.08, "axial_drag": 17.0}
     found = rft.link_force(GLASS, [0.1, -0.06], rotation, **options)
     expected = integrated([0.1, -0.06], rotation, *options.values())
-    np.testing.assert_allclose([*found.force, found.moment], expected, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(
+        [*found.force, found.moment], expected, rtol=1e-12, atol=1e-12
+    )
 
 
 def test_forces_on_the_links_of_a_swimmer_balance():
