@@ -5,7 +5,7 @@ Large requests are computed in tasks whose results do not depend on the executor
 last digit. `using` is written around a computation and is no argument of it:
 
     with geomech.workers.using(4):
-        study.compute_field()
+        study.tables.compute_field()
 """
 
 from __future__ import annotations
