@@ -1,25 +1,31 @@
 """Geometric mechanics of locomotion: from a force law to the displacement of a gait.
 
     study = geomech.study("three-link-glass")  # or a TOML file, or its parts
-    table = study.displacement([0.5, 1.0])    # with errors; .plot(), .save("a.nc")
-    study.ccf().plot()                        # also .connection(), .optimise()
+    table = study.displacement([0.5, 1.0])     # with errors; .plot(), .save("a.nc")
+    study.ccf().plot()                         # also .connection(), .optimise()
 
-study, Study                            a scene, and methods that ask questions of it
-displacement, ccf, sweep, optimise (optimize), forces, velocity, trajectory, walk,
-intrude grains                                  the same of any scene; results that
-print themselves drag_grains                             drag on a rod in beds of grains
-load_result, best_scene, fitted_medium  results from files; scenes and media that
-results have tiers, workers, accuracy                methods of prediction; processes;
-error against time load, Scene, Swimmer, Numerics, toml    scenes: read, built and
-written medium                                  a medium of the vertical plane, by name
-or from a file media, bodies, gaits, effects, systems  the parts of scenes; `register`
-adds custom ones connection, curvature, reconstruct      the geometry of any
-velocity(alpha, alphadot) symbolic                                formulas of
-connections and CCFs fit_medium, fit_gait, fitted_gait       media and gaits fitted to
-measurements measured, fit_log                       logs and midlines, stage by stage
-plots, undulation                       figures; swimmers that undulate Refusal
-the error for whatever makes no sense: a ValueError with its facts On the command line:
-`geomech --help`; every key of a scene file: `geomech reference`.
+Every question of the command line is a function of the same name:
+
+- of a scene: displacement, ccf, connection, velocity, sweep, run, accuracy, forces,
+  optimise (optimize), trajectory, intrude, walk, grains;
+- of measurements: fit_medium, fit_gait;
+- of a medium of the vertical plane: stress; of a rod in grains: drag_grains.
+
+The questions of a scene are methods of a study as well: study, Study. Other names:
+
+- load, Scene, Swimmer, Numerics, toml: scenes, read, built and written.
+- media, bodies, gaits, effects, systems: the parts of scenes; register adds yours;
+  medium is a stress map of the vertical plane, by name or from a file.
+- load_result, best_scene, fitted_medium, fitted_gait: results from files, and the
+  scene, medium or gait that a result has found.
+- measured, fit_log: logs and midlines, stage by stage.
+- geometry: connections, CCFs and metrics of any velocity(alpha, alphadot).
+- symbolic: connections and CCFs as formulas.
+- tiers: the methods of prediction. undulation: swimmers that undulate.
+- plots: figures. workers: processes for long computations.
+- Refusal: the error for whatever makes no sense, a ValueError with its facts.
+
+On the command line: `geomech --help`; every key of a scene file: `geomech reference`.
 """
 
 from __future__ import annotations
@@ -35,6 +41,7 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech.api import Study as Study
     from geomech.api import accuracy as accuracy
     from geomech.api import ccf as ccf
+    from geomech.api import connection as connection
     from geomech.api import displacement as displacement
     from geomech.api import drag_grains as drag_grains
     from geomech.api import fit_gait as fit_gait
@@ -45,23 +52,23 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech.api import load_result as load_result
     from geomech.api import optimise as optimise
     from geomech.api import optimize as optimize
+    from geomech.api import run as run
+    from geomech.api import stress as stress
     from geomech.api import study as study
     from geomech.api import sweep as sweep
     from geomech.api import trajectory as trajectory
     from geomech.api import velocity as velocity
     from geomech.api import walk as walk
     from geomech.mathematics import gaits as gaits
+    from geomech.mathematics import geometry as geometry
     from geomech.mathematics import symbolic as symbolic
     from geomech.mathematics import systems as systems
     from geomech.mathematics import tiers as tiers
-    from geomech.mathematics.geometry import connection as connection
-    from geomech.mathematics.geometry import curvature as curvature
-    from geomech.mathematics.geometry import reconstruct as reconstruct
     from geomech.mathematics.systems import Swimmer as Swimmer
     from geomech.results.measured import fitted_gait as fitted_gait
     from geomech.results.scenes import best_scene as best_scene
     from geomech.results.scenes import fitted_medium as fitted_medium
-    from geomech.run import workers as workers
+    from geomech.runs import workers as workers
     from geomech.scenes import Numerics as Numerics
     from geomech.scenes import Scene as Scene
     from geomech.scenes import load as load
@@ -82,19 +89,15 @@ __version__ = _version.VERSION
 
 _MODULES = {  # by their names here; none is imported before its first use
     **{
-        name: f"geomech.mathematics.geometry.{name}"
-        for name in ("connection", "curvature", "reconstruct")
-    },
-    **{
         name: f"geomech.mathematics.{name}"
-        for name in ("gaits", "symbolic", "systems", "tiers")
+        for name in ("gaits", "geometry", "symbolic", "systems", "tiers")
     },
     "measured": "geomech.studies.measured",
     "plots": "geomech.plots",
     **{name: f"rft.{name}" for name in ("bodies", "effects")},
     "media": "rft.laws",
     "undulation": "geomech.studies.mechanics.undulation",
-    "workers": "geomech.run.workers",
+    "workers": "geomech.runs.workers",
 }
 _OBJECTS = {
     **dict.fromkeys(
@@ -102,6 +105,7 @@ _OBJECTS = {
             "Study",
             "accuracy",
             "ccf",
+            "connection",
             "displacement",
             "drag_grains",
             "fit_gait",
@@ -112,6 +116,8 @@ _OBJECTS = {
             "load_result",
             "optimise",
             "optimize",
+            "run",
+            "stress",
             "study",
             "sweep",
             "trajectory",

@@ -29,6 +29,7 @@ from geomech.questions.swimmers.sweep import Sweep
 from geomech.questions.swimmers.trajectory import Trajectory
 from geomech.questions.swimmers.velocity import Velocity
 from geomech.questions.terradynamics.intrude import Intrude
+from geomech.questions.terradynamics.stress import Stress
 from geomech.questions.terradynamics.walk import Walk
 from geomech.scenes.parts import as_scene
 from geomech.studies.scene_tables import SceneTables
@@ -79,6 +80,19 @@ def function_of_file(
         return question(file, *values, **options).ask()
 
     describe(ask, question, "file")
+    return ask
+
+
+def function_of_medium(
+    question: Callable[Concatenate[Any, Fields], Question],
+) -> Callable[Concatenate[Any, Fields], Result]:
+    """Return the function that asks a question of a medium, by name or file."""
+
+    def ask(medium: Any, *values: Fields.args, **options: Fields.kwargs) -> Result:
+        refuse_unknown(question, options)
+        return question(medium, *values, **options).ask()
+
+    describe(ask, question, "medium")
     return ask
 
 
@@ -283,17 +297,22 @@ def load_result(path: str | Path) -> Result:
     return load(path)
 
 
+# Of a scene, each a method of `Study` as well.
 displacement = function_of_scene(Displacement)
 ccf = function_of_scene(Ccf)
+connection = function_of_scene(Connection)
 velocity = function_of_scene(Velocity)
 sweep = function_of_scene(Sweep)
+run = function_of_scene(Run)
+accuracy = function_of_scene(Accuracy)
 forces = function_of_scene(Forces)
 optimise = optimize = function_of_scene(Optimize)
 trajectory = function_of_scene(Trajectory)
-walk = function_of_scene(Walk)
 intrude = function_of_scene(Intrude)
+walk = function_of_scene(Walk)
 grains = function_of_scene(Grains)
-drag_grains = function_of_options(DragGrains)
+# Of measurements, of a medium, and of options alone.
 fit_medium = function_of_file(FitMedium)
-accuracy = function_of_scene(Accuracy)
 fit_gait = function_of_file(FitGait)
+stress = function_of_medium(Stress)
+drag_grains = function_of_options(DragGrains)

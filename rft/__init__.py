@@ -1,12 +1,14 @@
 """Resistive force theory: force laws, bodies and the balance of forces.
 
-Gaits are in `geomech`."""
+`link_force` is the force on a link at a velocity, `body_velocity` the velocity at which
+the forces on a body vanish. Gaits are in `geomech`."""
 
 import importlib
 import pkgutil
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from rft.balance.force import LinkForce, link_force
     from rft.balance.velocity import BodyVelocity, Solution, body_velocity
     from rft.bodies import Backbone, Body, Chain, ConstantCurvature, Serpenoid
     from rft.core.refusal import Refusal
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
 # not resumed.
 SOLVER = 13
 _NAMES = {
+    "rft.balance.force": "LinkForce link_force",
     "rft.balance.velocity": "BodyVelocity Solution body_velocity",
     "rft.bodies": "Backbone Body Chain ConstantCurvature Serpenoid",
     "rft.effects": "BodyInertia DepthProfile DisturbedGround EndCaps GrainInertia "
@@ -72,6 +75,7 @@ __all__ = [
     "EndCaps",
     "GrainInertia",
     "Granular",
+    "LinkForce",
     "Medium",
     "Refusal",
     "Serpenoid",
@@ -86,6 +90,7 @@ __all__ = [
     "Viscous",
     "Work",
     "body_velocity",
+    "link_force",
     "time_steps",
     "work_done",
 ]

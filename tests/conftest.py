@@ -110,7 +110,7 @@ def truths(request):
 @pytest.fixture(autouse=True)
 def no_lines_of_progress(monkeypatch):
     """What a command says does not hang on how busy the machine is."""
-    from geomech.run import progress
+    from geomech.runs import progress
 
     monkeypatch.setattr(progress, "PRINT_INTERVAL", 1e9)
 

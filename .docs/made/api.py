@@ -25,7 +25,7 @@ PACKAGES = {
         "geomech.studies.measured",
         "geomech.studies.mechanics.undulation",
         "geomech.plots",
-        "geomech.run.workers",
+        "geomech.runs.workers",
     ],
     "Geometry of any velocity": [
         "geomech.mathematics.geometry.connection",
@@ -249,15 +249,20 @@ def _public(module) -> list[str]:
 
 
 def _nowhere_else(module) -> list[str]:
-    """Return the functions of `geomech` that no other page documents."""
-    shown = [
-        f"{page}.{public}"
+    """Return the functions of `geomech` that no other page documents, each by its first
+    name."""
+    shown = {
+        id(getattr(_imported(page), public))
         for page in _pages()
         if page != "geomech"
         for public in _public(_imported(page))
-    ]
-    names = [name for name in dir(module) if inspect.isfunction(getattr(module, name))]
-    return [name for name in names if not any(x.endswith(f".{name}") for x in shown)]
+    }
+    functions: dict[int, str] = {}
+    for name in dir(module):
+        value = getattr(module, name)
+        if inspect.isfunction(value) and id(value) not in shown:
+            functions.setdefault(id(value), name)
+    return [*functions.values()]
 
 
 def wrong_examples() -> list[str]:

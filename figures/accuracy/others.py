@@ -33,7 +33,7 @@ from geomech.mathematics.geometry import connection
 from geomech.mathematics.geometry.curvature import ccf
 from geomech.mathematics.geometry.reconstruct import displacement
 from geomech.mathematics.systems import Solver, Swimmer
-from geomech.run.threads import one_blas_thread
+from geomech.runs.threads import one_blas_thread
 from rft import Backbone, Chain, Granular, Viscous, body_velocity
 from rft.balance.backend import preferring
 from rft.formulas import se2

@@ -236,7 +236,8 @@ class Result(Mapping[str, Variable]):
 
     def save(self, path: str | Path, **options: Any) -> None:
         """Write a file whose ending names its format: .nc, .json, .csv, .mat, .txt, or
-        one that the kind adds. `geomech.load_result` reads the first four."""
+        one that the kind adds. `geomech.load_result` reads the first four. A result of
+        `run` also fills a folder."""
         implementation("Result.save")(self, Path(path), **options)
 
     def plot(self, **options: Any) -> Any:

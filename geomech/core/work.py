@@ -1,6 +1,6 @@
 """The place where tasks are computed: this process, or the runner of a request.
 
-The runner is set from above (`geomech.run.runner`) and may store and distribute
+The runner is set from above (`geomech.runs.runner`) and may store and distribute
 tasks."""
 
 from __future__ import annotations

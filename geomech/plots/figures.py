@@ -108,7 +108,7 @@ def plane_connection_figure(
     --------
     >>> import geomech
     >>> study = geomech.study("seven-link-wave", grid=7).tables
-    >>> fig = geomech.plots.plane_connection_figure([study.plane((0, 5))])
+    >>> fig = geomech.plots.plane_connection_figure([study.plane((1, 6))])
     """
     draw = CONNECTION_STYLES[choose("style", style, CONNECTION_STYLES)]
     labels = labels or _angle_labels(len(planes[0].at))
@@ -117,7 +117,7 @@ def plane_connection_figure(
     fig, axes = _connection_panels(panels, len(planes))
     for plane, row in zip(planes, axes):
         connection = plane.connection
-        pair = [labels[k] for k in plane.pair]
+        pair = [labels[k - 1] for k in plane.pair]
         for component, ax in zip(panels, row):
             top = None
             if clim is not None:
@@ -162,9 +162,11 @@ def pairs_figure(
     fig, axes = figure(3.6 * columns, 3.2 * rows, columns, rows, layout="compressed")
     top = max(largest(f.values[component]) for f in fields)
     for (i, j), field, ax in zip(form.pairs, fields, axes.ravel()):
-        ccf_map(field, component, ax=ax, labels=(labels[i], labels[j]), clim=top)
-        title = f"{ax.get_title()}, {i + 1}{j + 1}"
-        fixed = [k for k in range(len(labels)) if k not in (i, j)]
+        ccf_map(
+            field, component, ax=ax, labels=(labels[i - 1], labels[j - 1]), clim=top
+        )
+        title = f"{ax.get_title()}, {i}{j}"
+        fixed = [k for k in range(len(labels)) if k + 1 not in (i, j)]
         if fixed:
             angles = [f"{quantity(labels[k][0])} = {at[k]:g}" for k in fixed]
             title += f"; {with_minus_signs(', '.join(angles))}"
@@ -235,7 +237,7 @@ def planes_figure(
     --------
     >>> import geomech
     >>> study = geomech.study("seven-link-wave", grid=7).tables
-    >>> fig = geomech.plots.planes_figure([study.plane((0, 5))], study.scene.gait)
+    >>> fig = geomech.plots.planes_figure([study.plane((1, 6))], study.scene.gait)
     """
     labels = labels or _angle_labels(len(planes[0].at))
     drawn = [*planes]
@@ -272,7 +274,7 @@ def _plane_row(plane: Plane | Slice, gait: Gait | None, labels: Labels) -> MapRo
             gaits.append(projected)
         else:
             shadows.append(projected)
-    pair = [labels[k] for k in plane.pair]
+    pair = [labels[k - 1] for k in plane.pair]
     return MapRow(plane.ccf, plane.error, gaits, pair, shadows)
 
 
@@ -285,8 +287,9 @@ def plane_title(plane: Plane | Slice, labels: Labels) -> str:
     """Return the angles of the fixed joints of a plane as a title."""
     if not plane.fixed:
         return ""
-    angles = [f"{quantity(labels[k][0])} = {plane.at[k]:.3g}" for k in plane.fixed]
-    unit = labels[plane.fixed[0]][1]
+    fixed = [k - 1 for k in plane.fixed]
+    angles = [f"{quantity(labels[k][0])} = {plane.at[k]:.3g}" for k in fixed]
+    unit = labels[fixed[0]][1]
     return f"{with_minus_signs(', '.join(angles))} {unit}"
 
 

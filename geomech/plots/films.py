@@ -18,9 +18,9 @@ from geomech.core.variables import Result
 from geomech.io.files import atomic_file
 from geomech.plots.terradynamics.walking import rows_at, walk_stage
 from geomech.results.scenes import scene_of
-from geomech.run.cost import Cost
-from geomech.run.progress import counted
-from geomech.run.progress import progress as progress_bar
+from geomech.runs.cost import Cost
+from geomech.runs.progress import counted
+from geomech.runs.progress import progress as progress_bar
 from geomech.studies.terradynamics import walking
 from rft.core.refusal import Refusal
 

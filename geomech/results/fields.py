@@ -28,8 +28,8 @@ class Slice:
 
     @property
     def fixed(self) -> list[int]:
-        """The joints that do not move, from 0."""
-        return [k for k in range(len(self.at)) if k not in self.pair]
+        """The joints that do not move, counted from 1."""
+        return [k for k in range(1, len(self.at) + 1) if k not in self.pair]
 
 
 def length_unit(variable: Variable) -> str:
@@ -96,7 +96,8 @@ def slices_of(result: Result, name: str) -> list[Slice]:
 
 
 def pairs_of(result: Result, name: str) -> list[tuple[str, tuple[int, int]]]:
-    """Return the endings of names such as ccf_1_3, and their joints from 0."""
+    """Return the endings of names such as ccf_1_3, and their joints, counted
+    from 1."""
     found = []
     for other in result:
         if not other.startswith(name):
@@ -105,7 +106,7 @@ def pairs_of(result: Result, name: str) -> list[tuple[str, tuple[int, int]]]:
         numbers = ending.split("_")[1:]
         if len(numbers) == 2 and all(map(str.isdigit, numbers)):
             i, j = map(int, numbers)
-            found.append((ending, (i - 1, j - 1)))
+            found.append((ending, (i, j)))
     return found
 
 

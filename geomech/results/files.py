@@ -11,7 +11,7 @@ from typing import Any
 
 from geomech.core.variables import Result
 from geomech.io import results as io
-from geomech.io.files import write_text
+from geomech.io.files import atomic_folder, write_text
 from geomech.results.kinds import kind_of
 from geomech.results.old import translated
 from geomech.results.show import text
@@ -105,8 +105,18 @@ def writer(path: Path, kind: Any) -> Callable:
 
 
 def save(result: Result, path: Path, **options: Any) -> None:
-    """Write a result in the format that the ending names."""
-    writer(path, kind_of(result))(path, result, **options)
+    """Write a result in the format that the ending names; one whose command fills a
+    folder, such as `run`, also into a folder."""
+    kind = kind_of(result)
+    if path.suffix or not getattr(kind, "folder", False):
+        writer(path, kind)(path, result, **options)
+        return
+    inputs: list[Path] = []
+    if result.question is not None:
+        inputs = result.question.inputs()
+        result.question.for_files([path], options)  # refuses what stands there
+    with atomic_folder(path, inputs) as folder:
+        kind.fill(result, folder, **options)
 
 
 def load(path: str | Path) -> Result:

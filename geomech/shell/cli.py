@@ -122,7 +122,7 @@ def geomech(
     plugin: PluginOption = None,
 ) -> None:
     """Geometric mechanics of locomotion: from a force law to displacement."""
-    from geomech.run.backend import at_once, prefer
+    from geomech.runs.backend import at_once, prefer
 
     # NumPy's first call takes half a second less; the pipeline knows who has much to
     # do.

@@ -120,12 +120,12 @@ SchedulerOption = Annotated[
 
 def with_workers(command: Callable) -> Callable:
     """Return a command that also takes ``--workers`` and ``--scheduler``
-    (`geomech.run.workers`)."""
+    (`geomech.runs.workers`)."""
 
     def run(
         workers: int | None = None, scheduler: str | None = None, **arguments: Any
     ) -> Any:
-        from geomech.run.workers import using
+        from geomech.runs.workers import using
 
         with using(workers, scheduler):
             return command(**arguments)

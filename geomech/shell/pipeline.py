@@ -17,8 +17,8 @@ from geomech.core.variables import Result
 from geomech.io.files import atomic_file, atomic_folder, note, refuse_inputs
 from geomech.questions.shared.base import Question, Run, ignore
 from geomech.results import show
-from geomech.run.backend import prefer_for
-from geomech.run.cost import Cost, decide
+from geomech.runs.backend import prefer_for
+from geomech.runs.cost import Cost, decide
 from geomech.shell import terminal
 from rft.core.notes import Note
 from rft.core.refusal import Refusal, in_line
@@ -133,7 +133,7 @@ def takes_time(question: Question) -> bool:
 def allow(question: Question, cost: Cost, yes: bool) -> None:
     """Print the cost of a question if it takes long; Refusal, with what to do instead,
     if it takes too long to begin without --yes: here, or in its first second
-    (`geomech.run.cost.decide`). From here on "auto" is the back end that its balances
+    (`geomech.runs.cost.decide`). From here on "auto" is the back end that its balances
     are worth."""
     name = question.subject_name
 
@@ -165,8 +165,8 @@ def storing(
 ) -> Iterator[None]:
     """Store the results of tasks that run in the body of the statement; at its end they
     are removed. Refusal while another computation for the output is running."""
-    from geomech.run import runner, store
-    from geomech.run.digest import digest
+    from geomech.runs import runner, store
+    from geomech.runs.digest import digest
 
     scene = Path(question.subject_name)
     context = runner.digest_context([x for x in inputs if x != scene])

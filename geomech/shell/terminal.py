@@ -22,8 +22,8 @@ from typing import Any
 
 import typer
 
-from geomech.run import THREAD_VARIABLES
-from geomech.run.progress import progress
+from geomech.runs import THREAD_VARIABLES
+from geomech.runs.progress import progress
 from rft.core.notes import Note
 from rft.core.refusal import Refusal, line, printable, spell_arguments
 

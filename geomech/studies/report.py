@@ -19,7 +19,7 @@ from geomech.mathematics.tiers.area import AREA
 from geomech.mathematics.tiers.fitted import axes as field_axes
 from geomech.mathematics.tiers.fitted import is_too_large
 from geomech.mathematics.tiers.path import PATH
-from geomech.run.cost import Cost
+from geomech.runs.cost import Cost
 from geomech.scenes.model import Scene
 from geomech.studies.available import default_tiers
 from geomech.studies.estimates import effort
@@ -82,7 +82,7 @@ def answer(tables: SceneTables, progress: Callable | None = None) -> Result:
 def pair_variables(tables: SceneTables, present: set[str]) -> list[Variable]:
     """Return the planes of all pairs of three joints as variables, without those whose
     names are present already."""
-    planes = [tables.plane(pair) for pair in combinations(range(3), 2)]
+    planes = [tables.plane(pair) for pair in combinations((1, 2, 3), 2)]
     found = [
         *shape_space.slice_variables(planes),
         *shape_space.connection_variables(planes),
@@ -205,7 +205,7 @@ def cost(scene: Scene) -> Cost:
     if is_mapped(system):
         parts += even_part_jobs(scene)
         if system.joints == 3:
-            pairs = [*combinations(range(3), 2)]
+            pairs = [*combinations((1, 2, 3), 2)]
             parts += plane_jobs(scene, pairs, [scene.gait.middle] * len(pairs))
         # A metric from the velocities of the harmonic table costs nothing more.
         if not (effort.why_no_metric(system) or effort.shares_velocities(system)):

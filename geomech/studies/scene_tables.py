@@ -31,7 +31,7 @@ from geomech.mathematics.systems.framed import NAME as MINIMUM_PERTURBATION
 from geomech.mathematics.systems.framed import in_frame
 from geomech.mathematics.tiers import TIERS, fitted, harmonic
 from geomech.mathematics.tiers.base import Plan, Table, Tier, in_groups
-from geomech.run.progress import progress as shown_progress
+from geomech.runs.progress import progress as shown_progress
 from geomech.scenes.frames import framed
 from geomech.scenes.model import Scene, frequency_of
 from geomech.studies.available import available_tiers, default_tiers
@@ -208,7 +208,7 @@ class SceneTables:
         shape: ArrayLike | None = None,
         progress: Callable | None = None,
     ) -> Plane:
-        """Return a plane of shape space in which two joints move, counted from 0,
+        """Return a plane of shape space in which two joints move, counted from 1,
         through a shape or the gait's middle: the CCF of that pair, without a field of
         all joints (`geomech.mathematics.geometry.representations.plane`)."""
         scene = self.scene

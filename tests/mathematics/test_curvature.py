@@ -33,7 +33,7 @@ def local(scene, shapes, h=2e-4):
     return np.moveaxis(d1[..., 1] - d2[..., 0] + bracket, -1, 0)
 
 
-@pytest.mark.parametrize(("i", "j"), [(0, 1), (0, 2), (1, 2)])
+@pytest.mark.parametrize(("i", "j"), [(1, 2), (1, 3), (2, 3)])
 def test_every_pair_of_three_joints(i, j):
     """Against SymPy, for a connection in which no two columns are alike; pairs are
     antisymmetric."""

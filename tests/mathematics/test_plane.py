@@ -93,15 +93,16 @@ def of_cubic(turns=1.0, **numerics):
 def test_planes_have_the_curvature_of_the_pair(pair):
     at = [0.3, -0.2, 0.4]
     study = of_cubic()
-    cut = study.plane(pair, at)
+    numbers = [k + 1 for k in pair]
+    cut = study.plane(numbers, at)
     shapes = np.broadcast_to(at, (7, 7, 3)).copy()
     shapes[..., pair] = np.stack(np.meshgrid(*cut.ccf.axes, indexing="ij"), -1)
     sign = 1 if pair[0] < pair[1] else -1
     right = np.moveaxis(sign * Cubic().ccf(shapes, *sorted(pair)), -1, 0)
     np.testing.assert_allclose(cut.ccf.values, right, atol=1e-12)
-    sliced = study.two_form.slice(*pair, at).values
+    sliced = study.two_form.slice(*numbers, at).values
     np.testing.assert_allclose(sliced, right, atol=1e-12)
-    looked_up = interpolated_plane(study.fitted, pair, at).connection.A
+    looked_up = interpolated_plane(study.fitted, numbers, at).connection.A
     np.testing.assert_allclose(looked_up, cut.connection.A, atol=1e-12)
 
 
@@ -111,14 +112,14 @@ def test_a_plane_is_that_of_the_whole_field_in_sand(at):
     axes = connection.grid(3, 5, 1.2)
     options = {"traits": system.traits, "trusted": True}
     fitted = connection.fit(system.velocity, axes, 16, **options)
-    given = system.velocity, (axes[0], axes[2]), (0, 2), at, 16
+    given = system.velocity, (axes[0], axes[2]), (1, 3), at, 16
     cut = plane(*given, traits=Traits(mirror=True))
     k = np.abs(axes[1] - at[1]).argmin()
     A = fitted.A[:, [0, 2]][..., k, :]
     np.testing.assert_allclose(cut.connection.A, A, atol=1e-9)
     residual = fitted.residual[..., k, :]
     np.testing.assert_allclose(cut.connection.residual, residual, atol=1e-9)
-    looked_up = interpolated_plane(fitted, (0, 2), at).connection
+    looked_up = interpolated_plane(fitted, (1, 3), at).connection
     for name in ("A", "residual", "speed"):
         found, same = getattr(looked_up, name), getattr(cut.connection, name)
         np.testing.assert_allclose(found, same, atol=1e-9, err_msg=name)
@@ -128,18 +129,18 @@ def test_many_joints_have_planes_and_no_field():
     swimmer = Swimmer(Viscous(2.0), Chain((1,) * 9))
     numerics = Numerics(grid=5, extent=1.0)
     study = SceneTables(Scene(swimmer, Wave(amplitude=0.5, joints=8), numerics))
-    assert study.plane((6, 2)).ccf.values.shape == (3, 5, 5)
+    assert study.plane((7, 3)).ccf.values.shape == (3, 5, 5)
     with pytest.raises(ValueError, match="lies outside the field"):
-        study.plane((0, 1), np.full(8, 1.1))
+        study.plane((1, 2), np.full(8, 1.1))
 
 
 @pytest.mark.parametrize(
     ("pair", "at", "held"),
     [
-        ((3, 1), [0.3, -0.1], [0.3, 0.7, -0.1, 0.7]),
-        ((3, 1), [0.3], [0.3, 0.7, 0.3, 0.7]),
-        ((3, 1), [0.3, 0.1, 0.2, 0.4], [0.3, 0.1, 0.2, 0.4]),
-        ((0, 2), None, [0.7] * 4),
+        ((4, 2), [0.3, -0.1], [0.3, 0.7, -0.1, 0.7]),
+        ((4, 2), [0.3], [0.3, 0.7, 0.3, 0.7]),
+        ((4, 2), [0.3, 0.1, 0.2, 0.4], [0.3, 0.1, 0.2, 0.4]),
+        ((1, 3), None, [0.7] * 4),
     ],
 )
 def test_slices_hold_joints_in_their_order(pair, at, held):
@@ -257,7 +258,7 @@ def test_a_file_of_three_joints_has_all_pairs():
     study = SceneTables(Scene(Swimmer(Viscous(2.3), FOUR_LINKS), LOOP, numerics))
     data = to_xarray(fields.full_result(study))
     assert data["pair_joints"].values.tolist() == [[1, 2], [1, 3], [2, 3]]
-    second = study.two_form.pair(0, 2).values
+    second = study.two_form.pair(1, 3).values
     np.testing.assert_array_equal(data["ccf_pairs"][1], second)
 
 

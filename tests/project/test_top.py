@@ -1,7 +1,9 @@
 """What is reached from `geomech` itself, and what it costs to start."""
 
 import ast
+import importlib
 import importlib.metadata
+import inspect
 import os
 import pathlib
 import re
@@ -14,6 +16,7 @@ import pytest
 from commands import geomech as run
 
 import geomech
+from geomech import questions
 from geomech.questions.shared import names
 
 ROOT = pathlib.Path(__file__).parents[2]
@@ -98,5 +101,13 @@ def test_the_program_that_checkers_look_at_runs():
     with commands.own_parts():
         import typed
 
-        for part in (typed.geometry, typed.scenes, typed.mechanics):
+        for part in (typed.connections, typed.scenes, typed.mechanics):
             part()
+
+
+def test_every_question_is_a_function_of_its_name():
+    importlib.import_module("geomech.runs.workers")  # no module takes its place
+    for name in questions.SUMMARIES:
+        assert getattr(geomech, name).__doc__.startswith(
+            inspect.cleandoc(questions.question(name).__doc__)
+        )

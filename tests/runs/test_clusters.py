@@ -11,10 +11,10 @@ from tasks import always_dies, dies, fails
 from test_digits import REQUESTS
 from test_store import same
 
-from geomech.run import executors
-from geomech.run.executors import Cluster
-from geomech.run.runner import runner
-from geomech.run.workers import using
+from geomech.runs import executors
+from geomech.runs.executors import Cluster
+from geomech.runs.runner import runner
+from geomech.runs.workers import using
 from geomech.studies.displacement import cycles
 from rft.core.refusal import Refusal
 

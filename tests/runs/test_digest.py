@@ -9,7 +9,7 @@ import pytest
 
 from geomech import scenes
 from geomech.mathematics.systems.solver import Solver
-from geomech.run.digest import Undigestible, digest
+from geomech.runs.digest import Undigestible, digest
 from geomech.studies.optimisation import build_request
 from geomech.studies.scene_tables import SceneTables
 

@@ -13,8 +13,8 @@ import geomech
 from geomech import scenes
 from geomech.mathematics.geometry import connection, metric
 from geomech.mathematics.systems import Solver, Swimmer
-from geomech.run import pending, runner
-from geomech.run.executors import Processes
+from geomech.runs import pending, runner
+from geomech.runs.executors import Processes
 from geomech.studies.displacement import cycles, tiered
 from geomech.studies.scene_tables import SceneTables
 from geomech.studies.terradynamics import walking

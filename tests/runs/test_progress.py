@@ -4,7 +4,7 @@ import sys
 import time
 from types import SimpleNamespace
 
-from geomech.run import progress
+from geomech.runs import progress
 from geomech.shell import terminal
 
 

@@ -12,11 +12,11 @@ from tasks import doubled
 from geomech import plots, scenes
 from geomech.mathematics.geometry import connection
 from geomech.questions.swimmers.trajectory import Trajectory
-from geomech.run import backend, store
-from geomech.run import runner as runners
-from geomech.run.cost import Cost
-from geomech.run.runner import digest_context, runner, store_results
-from geomech.run.store import Store
+from geomech.runs import backend, store
+from geomech.runs import runner as runners
+from geomech.runs.cost import Cost
+from geomech.runs.runner import digest_context, runner, store_results
+from geomech.runs.store import Store
 from geomech.shell import terminal
 from geomech.shell.pipeline import allow
 from geomech.studies.terradynamics import walking

@@ -11,8 +11,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from geomech.run import store
-from geomech.run.store import Store, cache_file, decode, partial_file
+from geomech.runs import store
+from geomech.runs.store import Store, cache_file, decode, partial_file
 from rft.core.refusal import Refusal
 
 

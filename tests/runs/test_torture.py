@@ -16,7 +16,7 @@ import pytest
 from commands import geomech
 
 from geomech import scenes
-from geomech.run.store import Store
+from geomech.runs.store import Store
 
 pytestmark = pytest.mark.skipif(
     not Path("/proc").is_dir(), reason="sees by /proc what is left of a process"
@@ -25,10 +25,10 @@ COMMAND = """
 import signal, sys
 for number in (signal.SIGINT, signal.SIGTERM):
     signal.signal(number, signal.SIG_DFL)
-from geomech import connection
+from geomech.mathematics.geometry import connection
 from geomech.shell import cli
-from geomech.run import pending, store
-from geomech.run import runner as runners
+from geomech.runs import pending, store
+from geomech.runs import runner as runners
 from geomech.studies.displacement import cycles
 store.CHECKPOINT = runners.CHECKPOINT = 0.05
 pending.WORTH_PROCESSES = 0.2

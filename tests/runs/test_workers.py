@@ -22,9 +22,9 @@ from tasks import (
 import geomech
 from geomech import scenes
 from geomech.core.errors import UnitWarning
-from geomech.run import executors, pending
-from geomech.run.runner import Runner, runner
-from geomech.run.workers import using
+from geomech.runs import executors, pending
+from geomech.runs.runner import Runner, runner
+from geomech.runs.workers import using
 from geomech.scenes import kinds
 from geomech.studies.displacement import cycles
 from rft.core import threads

@@ -10,7 +10,7 @@ from geomech import scenes
 from geomech.core.variables import Result, Variable
 from geomech.io.results import write_csv
 from geomech.questions.shared.base import Question
-from geomech.run.cost import Cost
+from geomech.runs.cost import Cost
 from geomech.shell import pipeline
 from geomech.studies.settings import measured_order
 from rft.core.refusal import Refusal

@@ -25,7 +25,7 @@ from geomech.core.variables import Result, Variable
 from geomech.io import results as io
 from geomech.questions.shared import base
 from geomech.results import files
-from geomech.run.digest import digest
+from geomech.runs.digest import digest
 from geomech.shell import cli
 from geomech.shell.command import declaration, figure, parameters
 from rft.core.refusal import Refusal
@@ -282,6 +282,19 @@ def test_a_method_of_a_study_asks_the_same(form, asked, result):
         if variable.name not in ROUGH:
             values = variable.values, again[variable.name].values
             np.testing.assert_array_equal(*values, variable.name)
+
+
+def test_a_run_from_python_fills_a_folder_as_the_command_does(tmp_path):
+    scene = geomech.load("three-link-viscous").with_numerics(grid=7, phases=16)
+    geomech.run(scene).save(tmp_path / "here")
+    (tmp_path / "a.toml").write_text(geomech.toml(scene))
+    run_geomech("run", "a.toml", "-o", "there", cwd=tmp_path)
+    names = [{p.name for p in (tmp_path / x).iterdir()} for x in ("here", "there")]
+    assert names[0] == names[1] and "displacement.json" in names[0]
+    other = scene.with_numerics(grid=9)
+    (tmp_path / "here" / "displacement.json").unlink()
+    with pytest.raises(Refusal, match="another scene stands there"):
+        geomech.run(other).save(tmp_path / "here")
 
 
 def test_a_body_of_one_joint_has_no_map():

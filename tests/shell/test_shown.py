@@ -150,9 +150,9 @@ FIELDS = {
     "frame's field": lambda s: (
         s.in_frame("minimum-perturbation").scene.system.field.field
     ),
-    "plane": lambda s: s.plane((0, 1)).connection,
-    "ccf of a plane": lambda s: s.plane((1, 0)).ccf,
-    "slice": lambda s: s.two_form.slice(0, 1, [0.1, 0.2]),
+    "plane": lambda s: s.plane((1, 2)).connection,
+    "ccf of a plane": lambda s: s.plane((2, 1)).ccf,
+    "slice": lambda s: s.two_form.slice(1, 2, [0.1, 0.2]),
     "pickled": lambda s: pickle.loads(pickle.dumps(s.fitted)),
 }
 

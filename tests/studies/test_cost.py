@@ -15,7 +15,7 @@ from geomech import scenes
 from geomech.mathematics.geometry import connection
 from geomech.mathematics.geometry.representations import harmonics
 from geomech.mathematics.systems import capabilities
-from geomech.run import cost as run_cost
+from geomech.runs import cost as run_cost
 from geomech.shell import terminal
 from geomech.studies.displacement import cycles
 from geomech.studies.estimates import estimate

@@ -15,7 +15,7 @@ from geomech.questions.swimmers.accuracy import Accuracy
 from geomech.questions.swimmers.ccf import Ccf
 from geomech.questions.swimmers.run import Run
 from geomech.questions.swimmers.sweep import Sweep
-from geomech.run.cost import BASE
+from geomech.runs.cost import BASE
 from geomech.scenes import Scene
 from geomech.studies.estimates import cost, effort
 from geomech.studies.mechanics import motion
@@ -134,7 +134,7 @@ TABLES = {
     "even part": (cost.even_part_jobs, lambda tables: tables.even_part),
     "plane": (
         lambda s: cost.plane_jobs(s, [(0, 1)], [s.gait.middle]),
-        lambda tables: tables.plane((0, 1)),
+        lambda tables: tables.plane((1, 2)),
     ),
 }
 

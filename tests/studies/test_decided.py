@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from geomech import scenes
-from geomech.run import cost as run_cost
-from geomech.run import runner as runners
-from geomech.run.backend import WORTH_LOADING
-from geomech.run.cost import Cost, decide, is_undecided
+from geomech.runs import cost as run_cost
+from geomech.runs import runner as runners
+from geomech.runs.backend import WORTH_LOADING
+from geomech.runs.cost import Cost, decide, is_undecided
 from geomech.studies.scene_tables import SceneTables
 from rft.balance.backend import preferring
 from rft.balance.listening import listener, listening, no_listener

@@ -714,6 +714,13 @@ def test_columns_that_a_log_lacks_are_named(header, columns, said, tmp_path):
         measured.read(path, columns=columns.split())
 
 
+def test_harmonics_beyond_the_rows_are_refused_before_the_fit(viscous, monkeypatch):
+    log = log_of(synthetic.synthetic_log(viscous, GAIT, cycles=12, samples=20))
+    monkeypatch.setattr(smooth, "smoothed", lambda *_: pytest.fail("it was smoothed"))
+    with refused("at most 5.*got 9"):
+        measured.fit_log(log, harmonics=9)
+
+
 DEGREE = 180 / np.pi
 IN_DEGREES = "t a1_deg a2_deg x y heading_deg"
 

@@ -18,7 +18,7 @@ FACTS = {"lammps": 20250722, "grains": 16225}
 def obey(patch):
     """Let experiments return runs by the law. patch: a MonkeyPatch."""
     for module in (grains, grain_swim):
-        patch.setattr(module, "load_lammps", lambda: None)
+        patch.setattr(module, "require_lammps", lambda: None)
     settled = types.SimpleNamespace(facts={"packing": 0.6, "surface": 0.05})
     patch.setattr(grains, "settle", lambda *_: settled)
     patch.setattr(Experiment, "run", run)

@@ -12,7 +12,7 @@ from unittest import mock
 import pytest
 import typer.main
 
-from geomech.run import backend
+from geomech.runs import backend
 from geomech.scenes import kinds
 from geomech.shell import cli
 from rft.balance.backend import preferring

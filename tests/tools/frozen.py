@@ -206,7 +206,9 @@ def namespace() -> dict:
     found: dict = {"np": np, "math": math, "rft": rft, "geomech": top}
     for module in (rft, top.systems, top.gaits, top.bodies, top.media, top.effects):
         found |= {name: x for name, x in vars(module).items() if isinstance(x, type)}
-    return found | {name: getattr(top, name) for name in public_names(top)}
+    found |= {name: getattr(top, name) for name in public_names(top)}
+    modules = ("connection", "curvature", "reconstruct")
+    return found | {name: getattr(top.geometry, name) for name in modules}
 
 
 def raw(text: str) -> bytes:

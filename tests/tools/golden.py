@@ -45,7 +45,7 @@ import rft
 from geomech.io.results import from_dict
 from geomech.mathematics.systems.capabilities import solver_of
 from geomech.questions.shared import names
-from geomech.run import cost
+from geomech.runs import cost
 from geomech.shell import pipeline
 from rft.balance import backend
 from rft.terradynamics.meshes import Spatial, wrench

@@ -7,7 +7,7 @@ import warnings
 from pathlib import Path
 
 from geomech.core.errors import UnitWarning
-from geomech.run.runner import runner
+from geomech.runs.runner import runner
 from rft.balance import backend
 from rft.core.refusal import Refusal
 from rft.core.threads import thread_count

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 
 import geomech
 import rft
-from geomech import connection, curvature, plots, reconstruct
+from geomech import geometry, plots
 from geomech.core.variables import Result, Variable
 from geomech.mathematics import symbolic
 from geomech.mathematics.gaits import (
@@ -79,9 +79,11 @@ class Cart:
         )
 
 
-def geometry() -> list[Any]:
-    fitted = connection.fit(velocity, connection.grid(joints=2, points=5))
-    ccf = curvature.ccf(fitted)
+def connections() -> list[Any]:
+    fitted = geometry.connection.fit(
+        velocity, geometry.connection.grid(joints=2, points=5)
+    )
+    ccf = geometry.curvature.ccf(fitted)
     figure, axes = geomech.plots.figure(3.0, 3.0)
     over = ("tier", "amplitude")
     x = Variable("x", over, np.zeros((1, 2)), "BL")
@@ -102,7 +104,7 @@ def geometry() -> list[Any]:
         fitted.A,
         table,
         figure,
-        reconstruct.displacement(np.zeros((4, 3))),
+        geometry.reconstruct.displacement(np.zeros((4, 3))),
         harmonics.fit,
         symbolic.velocity,
     ]

@@ -31,16 +31,17 @@ def _checked(connection, i, j) -> None:
             value=connection,
         )
     joints = connection.field.joints
-    are_joints = all(is_whole(k) and 0 <= k < max(joints, 2) for k in (i, j))
+    are_joints = all(is_whole(k) and 1 <= k <= max(joints, 2) for k in (i, j))
     if not are_joints or i == j:
         raise Refusal(
-            f"i and j must be two of the joints 0 to {joints - 1},"
+            f"i and j must be two of the joints 1 to {joints},"
             f" got {formatted(i)} and {formatted(j)}"
         )
 
 
-def exterior_derivative(connection: Connection, i: int = 0, j: int = 1) -> np.ndarray:
-    """Return d_i A_j - d_j A_i on the grid, (3, N_1, ..., N_d).
+def exterior_derivative(connection: Connection, i: int = 1, j: int = 2) -> np.ndarray:
+    """Return d_i A_j - d_j A_i on the grid, (3, N_1, ..., N_d), of the joints i and j,
+    counted from 1.
 
     Examples
     --------
@@ -55,11 +56,14 @@ def exterior_derivative(connection: Connection, i: int = 0, j: int = 1) -> np.nd
     """
     _checked(connection, i, j)
     field = connection.field
-    return field.derivative(i)[:, j] - field.derivative(j)[:, i]
+    along_i = field.derivative(i - 1)
+    along_j = field.derivative(j - 1)
+    return along_i[:, j - 1] - along_j[:, i - 1]
 
 
-def lie_bracket(connection: Connection, i: int = 0, j: int = 1) -> np.ndarray:
-    """Return [A_i, A_j] on the grid, (3, N_1, ..., N_d).
+def lie_bracket(connection: Connection, i: int = 1, j: int = 2) -> np.ndarray:
+    """Return [A_i, A_j] on the grid, (3, N_1, ..., N_d), of the joints i and j, counted
+    from 1.
 
     Examples
     --------
@@ -72,12 +76,14 @@ def lie_bracket(connection: Connection, i: int = 0, j: int = 1) -> np.ndarray:
     """
     _checked(connection, i, j)
     columns = np.moveaxis(connection.A, 0, -1)
-    return np.moveaxis(se2.bracket(columns[i], columns[j]), -1, 0)
+    return np.moveaxis(se2.bracket(columns[i - 1], columns[j - 1]), -1, 0)
 
 
-def ccf(connection: Connection, i: int = 0, j: int = 1) -> Field:
+def ccf(connection: Connection, i: int = 1, j: int = 2) -> Field:
     """Return CCF_ij on the grid, values (3, N_1, ..., N_d): displacement per rad^2, in
     the connection's length unit and rad.
+
+    i, j: joints, counted from 1.
 
     Examples
     --------
@@ -104,7 +110,7 @@ def ccf(connection: Connection, i: int = 0, j: int = 1) -> Field:
     return Field(connection.axes, values, connection.degree, **connection.size)
 
 
-def error(connection: Connection, i: int = 0, j: int = 1) -> Field:
+def error(connection: Connection, i: int = 1, j: int = 2) -> Field:
     """Return the estimated error of `ccf`, values (3, N_1, ..., N_d) in its units, from
     the grid against its halves, without a solve. For a connection near a measured gait
     it is the uncertainty that the log leaves.

@@ -32,6 +32,7 @@ from geomech.mathematics.geometry.curvature import ccf
 from geomech.mathematics.geometry.curvature import error as ccf_error
 from geomech.mathematics.geometry.gait import Gait, checked_gait
 from geomech.mathematics.geometry.representations.field import Field
+from geomech.mathematics.geometry.representations.plane import plane_shapes
 from rft.core.checks import in_range, real_array
 from rft.core.refusal import Refusal
 from rft.formulas import se2
@@ -43,8 +44,8 @@ RADII = 6  # nodes of Gauss's rule along a cone
 class TwoForm:
     """CCF_ij of all pairs i < j.
 
-    field: values (pairs, 3, N_1, ..., N_d). pairs: of joints, from 0, in the field's
-    order."""
+    field: values (pairs, 3, N_1, ..., N_d). pairs: of joints, counted from 1, in
+    the field's order."""
 
     field: Field
     pairs: tuple[tuple[int, int], ...]
@@ -54,10 +55,11 @@ class TwoForm:
         return f"TwoForm({pairs}; {self.field!r})"
 
     def pair(self, i: int, j: int) -> Field:
-        """Return CCF_ij, values (3, N_1, ..., N_d); CCF_ji has the opposite sign."""
+        """Return CCF_ij, values (3, N_1, ..., N_d), of the joints i and j, counted from
+        1; CCF_ji has the opposite sign."""
         if {i, j} not in map(set, self.pairs) or i == j:
             raise Refusal(
-                f"i and j must be two of the joints 0 to {self.field.joints - 1},"
+                f"i and j must be two of the joints 1 to {self.field.joints},"
                 f" got {i} and {j}"
             )
         sign = 1.0 if i < j else -1.0
@@ -68,9 +70,8 @@ class TwoForm:
         """Return CCF_ij over the plane of joints i and j through the shape ``at`` (d,):
         a field of two joints, for pictures."""
         at = self.field.inside(real_array("at", at))
-        axes = (self.field.axes[i], self.field.axes[j])
-        shapes = np.broadcast_to(at, (len(axes[0]), len(axes[1]), len(at))).copy()
-        shapes[..., [i, j]] = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
+        axes = (self.field.axes[i - 1], self.field.axes[j - 1])
+        shapes = plane_shapes(axes, (i, j), at)
         values = np.moveaxis(self.pair(i, j)(shapes), -1, 0)
         return replace(self.field, axes=axes, values=values)
 
@@ -86,7 +87,7 @@ class TwoForm:
     def __call__(self, alpha, u, v) -> np.ndarray:
         """Return CCF(u, v) (..., 3) at shapes alpha (..., d), for changes of shape u, v
         (..., d)."""
-        i, j = np.array(self.pairs).T
+        i, j = np.array(self.pairs).T - 1
         area = u[..., i] * v[..., j] - u[..., j] * v[..., i]
         return np.einsum("...pc,...p->...c", self.field(alpha), area)
 
@@ -105,7 +106,7 @@ def error(connection: Connection) -> TwoForm:
 
 def _from_pairs(component: Callable, connection: Connection) -> TwoForm:
     """Return the two-form with component(connection, i, j) for each pair of joints."""
-    pairs = tuple(combinations(range(len(connection.axes)), 2))
+    pairs = tuple(combinations(range(1, len(connection.axes) + 1), 2))
     if not pairs:
         raise Refusal(
             "a CCF needs at least two joints",

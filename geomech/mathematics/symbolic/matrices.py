@@ -27,9 +27,11 @@ def bracket(X: sp.Matrix, Y: sp.Matrix) -> sp.Matrix:
     return sp.Matrix([Y[2] * X[1] - X[2] * Y[1], X[2] * Y[0] - Y[2] * X[0], 0])
 
 
-def ccf(A: sp.Matrix, alpha: Sequence[sp.Symbol], i: int = 0, j: int = 1) -> sp.Matrix:
+def ccf(A: sp.Matrix, alpha: Sequence[sp.Symbol], i: int = 1, j: int = 2) -> sp.Matrix:
     """Return d_i A_j - d_j A_i + [A_i, A_j] of a connection A (3, d), a column of
     three.
+
+    i, j: joints, counted from 1.
 
     Examples
     --------
@@ -41,7 +43,9 @@ def ccf(A: sp.Matrix, alpha: Sequence[sp.Symbol], i: int = 0, j: int = 1) -> sp.
     [-r**2/w],
     [      0]])
     """
-    return A[:, j].diff(alpha[i]) - A[:, i].diff(alpha[j]) + bracket(A[:, i], A[:, j])
+    A_i = A[:, i - 1]
+    A_j = A[:, j - 1]
+    return A_j.diff(alpha[i - 1]) - A_i.diff(alpha[j - 1]) + bracket(A_i, A_j)
 
 
 def velocity(A: sp.Matrix, alpha: Sequence[sp.Symbol]) -> Callable[..., Any]:

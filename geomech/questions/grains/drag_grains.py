@@ -10,7 +10,7 @@ from geomech.io.files import write_text
 from geomech.questions.shared import parsing, tools
 from geomech.questions.shared.base import Option, Question, Run
 from geomech.questions.shared.common import Store
-from geomech.run.cost import Cost
+from geomech.runs.cost import Cost
 from rft.core.checks import real_array
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from geomech.core.variables import Result
 from geomech.questions.shared import loading, names
 from geomech.questions.shared.base import Option, Question, Run, Subject
 from geomech.questions.shared.common import Store
-from geomech.run.cost import Cost
+from geomech.runs.cost import Cost
 
 if TYPE_CHECKING:
     from geomech.scenes.model import Scene

@@ -21,7 +21,7 @@ from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
     from geomech.core.variables import Result
-    from geomech.run.cost import Cost
+    from geomech.runs.cost import Cost
     from geomech.studies.scene_tables import SceneTables
 
 Progress = Callable[[float], None]
@@ -195,7 +195,7 @@ class Question(Plain):
         scene, if there are some already.
 
         BLAS takes one thread meanwhile, as it does in a command."""
-        from geomech.run.threads import one_blas_thread
+        from geomech.runs.threads import one_blas_thread
 
         self.check()
         with one_blas_thread():

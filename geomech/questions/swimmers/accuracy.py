@@ -11,7 +11,7 @@ from geomech.core.variables import Result
 from geomech.questions.shared import loading, names
 from geomech.questions.shared.base import Option, Question, Run, Subject
 from geomech.results.numbers import number, size
-from geomech.run.cost import Cost
+from geomech.runs.cost import Cost
 from rft.core.checks import in_range
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from geomech.io.files import note
 from geomech.questions.shared import loading, names, parsing, tools
 from geomech.questions.shared.base import Option, Question, Run, Subject
 from geomech.questions.shared.common import ColourLimit, OtherFrame, Pair, Panels, Slice
-from geomech.run.cost import Cost
+from geomech.runs.cost import Cost
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from geomech.questions.shared.base import Option, Question, Run, Subject
 from geomech.questions.shared.common import CurvePanels
 from geomech.questions.shared.texts import measurements
 from geomech.results.numbers import size
-from geomech.run.cost import Cost
+from geomech.runs.cost import Cost
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:

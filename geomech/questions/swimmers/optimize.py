@@ -12,7 +12,7 @@ from geomech.questions.shared import loading, names, parsing
 from geomech.questions.shared.base import Option, Question, Run, Subject
 from geomech.questions.shared.common import ColourLimit
 from geomech.results.show import scalar
-from geomech.run.cost import Cost
+from geomech.runs.cost import Cost
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from geomech.questions.swimmers.displacement import (
     measured_points,
     tier_words,
 )
-from geomech.run.cost import Cost
+from geomech.runs.cost import Cost
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from geomech.core.variables import Result
 from geomech.questions.shared import loading, names, parsing
 from geomech.questions.shared.base import Option, Question, Run, Subject
-from geomech.run.cost import Cost
+from geomech.runs.cost import Cost
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from geomech.core.variables import POSE, Result
 from geomech.questions.shared import loading, names
 from geomech.questions.shared.base import Option, Question, Run, Subject
 from geomech.questions.shared.tools import FILMS, check_films, is_film
-from geomech.run.cost import Cost
+from geomech.runs.cost import Cost
 
 if TYPE_CHECKING:
     from geomech.scenes.model import Scene

@@ -10,7 +10,7 @@ from geomech.core.summary import first_place
 from geomech.core.variables import Result
 from geomech.questions.shared import loading, names
 from geomech.questions.shared.base import Question, Run, Subject
-from geomech.run.cost import Cost
+from geomech.runs.cost import Cost
 
 if TYPE_CHECKING:
     from geomech.scenes.terradynamics.intruding import Intruding

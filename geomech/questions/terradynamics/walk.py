@@ -13,7 +13,7 @@ from geomech.questions.shared import loading, names
 from geomech.questions.shared.base import Option, Question, Run, Subject
 from geomech.questions.shared.tools import FILMS, check_films
 from geomech.results.show import scalar
-from geomech.run.cost import LONGEST, Cost
+from geomech.runs.cost import LONGEST, Cost
 
 if TYPE_CHECKING:
     from geomech.scenes.terradynamics.walker import WalkerScene

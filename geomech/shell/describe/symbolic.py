@@ -47,11 +47,11 @@ def formulas(scene: Scene, ccf: bool = True, latex: bool = False) -> Iterator[st
     yield formatted(A, "A")
     if not ccf:
         return
-    for i, j in itertools.combinations(range(len(alpha)), 2):
+    for i, j in itertools.combinations(range(1, len(alpha) + 1), 2):
         of_two = closed_form.simplified(closed_form.ccf(A, alpha, i, j), alpha)
-        name = f"CCF_{i + 1}{j + 1}"
+        name = f"CCF_{i}{j}"
         if latex:
-            name = f"F_{{{i + 1}{j + 1}}}"
+            name = f"F_{{{i}{j}}}"
         yield formatted(of_two, name)
 
 

@@ -16,8 +16,8 @@ import numpy as np
 
 from geomech.core.setting import Setting
 from geomech.core.variables import Result, Variable
-from geomech.run.cost import Cost
-from geomech.run.runner import runner
+from geomech.runs.cost import Cost
+from geomech.runs.runner import runner
 from geomech.studies.settings import Measurements, measurement_variables, padded_array
 
 # Modules of other kinds of scene, loaded only where needed.

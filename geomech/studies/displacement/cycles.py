@@ -12,7 +12,7 @@ import numpy as np
 from geomech.core.variables import Variable
 from geomech.mathematics.systems.base import body_size, length_unit
 from geomech.mathematics.systems.capabilities import gaits_per_batch
-from geomech.run.cost import Cost
+from geomech.runs.cost import Cost
 from geomech.scenes import write as written
 from geomech.scenes.model import Scene, checked_scene
 from geomech.studies.displacement.batch import grouped, joined_scene

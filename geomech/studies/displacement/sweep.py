@@ -14,8 +14,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from geomech.core.variables import Result, Variable
-from geomech.run.cost import Cost
-from geomech.run.runner import digest_context, runner, store_results
+from geomech.runs.cost import Cost
+from geomech.runs.runner import digest_context, runner, store_results
 from geomech.scenes.read import inputs
 from geomech.studies.grid import Grid, checked_grid_values
 from rft.core.refusal import Refusal
@@ -160,7 +160,7 @@ def sweep(
     Points that differ only in the gait or in batched fields of effects
     (`batched_question` in rft/effects), and robots, are solved in batches. partial: a
     file that stores finished batches, so that the same sweep resumes; the caller
-    removes it after saving the results. Executors: see `geomech.run.workers`. Refusal
+    removes it after saving the results. Executors: see `geomech.runs.workers`. Refusal
     if a point of the grid makes no scene."""
     plan = Plan(scene, over)
     _ = plan.grid  # refused before anything is stored

@@ -24,7 +24,7 @@ from geomech.mathematics.systems.capabilities import (
 from geomech.mathematics.tiers import TIERS
 from geomech.mathematics.tiers.base import Plan, Tier
 from geomech.mathematics.tiers.direct import DIRECT
-from geomech.run.cost import Cost
+from geomech.runs.cost import Cost
 from geomech.scenes.model import Scene, checked_scene
 from geomech.studies.available import available_tiers
 from geomech.studies.estimates import cost as cost_jobs

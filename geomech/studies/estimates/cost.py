@@ -4,7 +4,7 @@ list of jobs, counted before anything is computed.
 Balances are counted as tiers and error estimates (`geomech.studies.estimates.estimate`)
 need them.
 Where time stepping runs until cycles repeat, the number of cycles is assumed. Seconds
-are those of `geomech.run.cost`. From Python nothing is refused: see
+are those of `geomech.runs.cost`. From Python nothing is refused: see
 `SceneTables.cost`."""
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ from geomech.mathematics.systems.capabilities import (
 from geomech.mathematics.systems.framed import Framed
 from geomech.mathematics.tiers import fitted, harmonic
 from geomech.mathematics.tiers.base import Plan, Table, solved_phases
-from geomech.run.backend import prefer_backend
-from geomech.run.cost import BASE, Cost, assumed_seconds
+from geomech.runs.backend import prefer_backend
+from geomech.runs.cost import BASE, Cost, assumed_seconds
 from geomech.scenes.model import Scene
 from geomech.studies.estimates import effort, estimate, uncertainty
 from geomech.studies.estimates.elements import coarser_systems

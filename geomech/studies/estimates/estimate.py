@@ -26,7 +26,7 @@ from geomech.mathematics.systems.capabilities import (
     refined,
     table_error,
 )
-from geomech.run.runner import runner
+from geomech.runs.runner import runner
 from geomech.scenes.model import Scene
 from geomech.studies.estimates import elements
 from rft.core.premise import Premise

@@ -11,16 +11,16 @@ from pathlib import Path
 import numpy as np
 
 from geomech.core.variables import Result, Variable
-from geomech.run.cost import BASE, Cost, TooLong, duration
-from geomech.run.runner import runner
-from geomech.run.store import cache_folder
+from geomech.runs.cost import BASE, Cost, TooLong, duration
+from geomech.runs.runner import runner
+from geomech.runs.store import cache_folder
 from geomech.studies.terradynamics.calibration import fit_variables
 from rft.core.checks import in_range, is_number, is_whole
 from rft.core.refusal import Refusal, require
 from rft.fits.rods import Fit, fit
 from rft.grains.bed import Bed
 from rft.grains.drag import UNSTEADY_TRAVEL, Drag, flank_and_ends
-from rft.grains.engine import load_lammps
+from rft.grains.engine import require_lammps
 from rft.grains.experiment import SETTLING_TIMES, Experiment, Run, settle
 from rft.grains.motions import Tow
 from rft.grains.spheres import Spheres, rod
@@ -150,7 +150,7 @@ class DraggedRod:
         )
         for experiment in self.experiments()[: len(angles)]:
             experiment.check()
-        load_lammps()
+        require_lammps()
 
     def cost(self, store: Path) -> GrainSteps:
         return grain_cost(self.experiments(), store)

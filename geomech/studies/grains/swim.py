@@ -14,7 +14,7 @@ import numpy as np
 from geomech.core.variables import Result, Variable
 from geomech.mathematics.systems.base import body_size
 from geomech.mathematics.systems.swimmer import Swimmer
-from geomech.run.backend import prefer_backend
+from geomech.runs.backend import prefer_backend
 from geomech.scenes.model import Scene
 from geomech.studies.grains.drag import GrainSteps, grain_cost, store_folder
 from geomech.studies.scene_tables import SceneTables
@@ -24,7 +24,7 @@ from rft.core.checks import in_range, is_number
 from rft.core.refusal import Refusal, located, require
 from rft.effects import EndCaps
 from rft.grains.bed import Bed
-from rft.grains.engine import load_lammps
+from rft.grains.engine import require_lammps
 from rft.grains.experiment import Experiment, Run
 from rft.grains.motions import Swim
 from rft.grains.spheres import chain
@@ -158,7 +158,7 @@ class GrainSwim:
         with located(self.scene.name):
             self.experiment.check()
         store_folder(self.store)  # refuses where there is none
-        load_lammps()
+        require_lammps()
 
     def cost(self) -> GrainSteps:
         return grain_cost([self.experiment], store_folder(self.store))

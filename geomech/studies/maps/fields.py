@@ -489,7 +489,7 @@ def ccf_variable(
 def pair_variables(form: TwoForm, error: TwoForm) -> list[Variable]:
     """Return the CCF of all pairs of joints, its error, and the pairs."""
     unit = form.field.unit
-    pairs = np.array(form.pairs) + 1.0
+    pairs = np.array(form.pairs, float)
     order = ", ".join(f"{i:g} {j:g}" for i, j in pairs)
     return [
         Variable(

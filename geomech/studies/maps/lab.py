@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar
 
-from geomech.run.cost import WORTH_SAYING, Cost
+from geomech.runs.cost import WORTH_SAYING, Cost
 from geomech.scenes.model import Scene
 from geomech.studies.displacement.cycles import Cycles
 from geomech.studies.estimates import cost

@@ -21,7 +21,7 @@ from geomech.mathematics.systems.capabilities import stored_table
 from geomech.mathematics.tiers.area import AREA
 from geomech.mathematics.tiers.fitted import finest_grid, refuse
 from geomech.mathematics.tiers.harmonic import is_looked_up
-from geomech.run.cost import Cost
+from geomech.runs.cost import Cost
 from geomech.scenes.model import Scene
 from geomech.studies.displacement.variables import COMPONENTS, POSE
 from geomech.studies.estimates.cost import (
@@ -136,8 +136,8 @@ class Plan:
 
     @cached_property
     def pairs_and_origins(self) -> list[tuple[tuple[int, int], np.ndarray]]:
-        """Pairs of joints of the planes, from 0, and the shape through which each plane
-        goes."""
+        """Pairs of joints of the planes, counted from 1, and the shape through which
+        each plane goes."""
         if not self.planes:
             return []
         joints = self.scene.system.joints
@@ -145,7 +145,7 @@ class Plan:
         if is_single:
             pairs = [_checked_pair(self.pair, joints)]
         else:
-            pairs = list(combinations(range(joints), 2))
+            pairs = list(combinations(range(1, joints + 1), 2))
         if len(pairs) > MAX_PAIRS:
             raise Refusal(
                 f"{joints} joints have {len(pairs)} pairs",
@@ -296,7 +296,7 @@ def ccf_variables(name: str, planes: Sequence[Plane]) -> list[Variable]:
                 plane_dims(plane),
                 ccf.values,
                 fields.component_units(ccf.unit, "rad2"),
-                f"CCF of joints {first + 1} and {second + 1}",
+                f"CCF of joints {first} and {second}",
                 plane.error.values,
             )
         )
@@ -338,13 +338,13 @@ def slice_variables(planes: Sequence[Plane]) -> list[Variable]:
 def joint_suffix(plane: Plane) -> str:
     """Return the ending of names for the joints of a plane, such as _1_3."""
     i, j = plane.pair
-    return f"_{i + 1}_{j + 1}"
+    return f"_{i}_{j}"
 
 
 def plane_dims(plane: Plane) -> tuple[str, str, str]:
     """Return the dimensions of the CCF of a plane."""
     i, j = plane.pair
-    return ("component", f"alpha_{i + 1}", f"alpha_{j + 1}")
+    return ("component", f"alpha_{i}", f"alpha_{j}")
 
 
 def zero_line(ccf: Field, middle: np.ndarray) -> list[Variable]:
@@ -402,7 +402,7 @@ def enclosed_area(area: Result) -> list[Variable]:
 
 
 def _checked_pair(pair: Any, joints: int) -> tuple[int, int]:
-    """Return the joints, counted from 0, of a text such as 1,3 or of two numbers."""
+    """Return the joints, counted from 1, of a text such as 1,3 or of two numbers."""
     names = pair
     if isinstance(pair, str):
         names = pair.split(",")
@@ -413,8 +413,8 @@ def _checked_pair(pair: Any, joints: int) -> tuple[int, int]:
     elif np.ndim(pair) != 1 or len(pair) != 2 or not all(map(is_whole, pair)):
         raise Refusal("pair must be two joints such as (1, 2)", value=pair)
 
-    i, j = (int(x) - 1 for x in names)
-    if i == j or not all(0 <= k < joints for k in (i, j)):
+    i, j = (int(x) for x in names)
+    if i == j or not all(1 <= k <= joints for k in (i, j)):
         raise Refusal(
             f"{pair!r} must be two different joints from 1 to {joints}",
             where="``pair``",
@@ -434,7 +434,7 @@ def plane_origin(
     is_single: there is no other plane, so that angles may also be those of the other
     joints one by one."""
     origin = scene.gait.middle.copy()
-    fixed = [k for k in range(scene.system.joints) if k not in pair]
+    fixed = [k for k in range(scene.system.joints) if k + 1 not in pair]
     if angles is not None and not fixed:
         raise Refusal(
             "``slice`` says where other joints are held, and this body has but two",

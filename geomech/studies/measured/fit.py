@@ -187,9 +187,11 @@ def fit_log(
     if body_length is not None:
         body_length *= log.size
     period = cycles.period(log)
+    rows = len(log.t) * period / (log.t[-1] - log.t[0])
+    if harmonics is not None:
+        _check_harmonics(log, harmonics, rows)
     joints = smooth.smoothed(log.t, log.alpha, period)
     pose = smooth.smoothed(log.t, log.pose, period)
-    rows = len(log.t) * period / (log.t[-1] - log.t[0])
     cycles.check_a_loop(log, joints, rows)
     most = max(1, int(min(HARMONICS, joints.knots / 2, rows / 4)))
     phase, loop = cycles.phases(log, joints, period, most)
@@ -208,6 +210,17 @@ def fit_log(
     fit = _regress(rows_of_log, combined, level, harmonics, limits, body_length)
     plausibility.note_units(log, joints, pose, period, body_length)
     return fit
+
+
+def _check_harmonics(log: Log, harmonics: int, rows: float) -> None:
+    """Refuse more harmonics than the rows per cycle can tell apart, before anything is
+    fitted."""
+    most = int(min(HARMONICS, rows / 4))
+    if harmonics > most:
+        raise log.wrong(
+            f"``harmonics`` must be at most {most}, a quarter of the {rows:.3g} rows"
+            f" per cycle, got {harmonics}"
+        )
 
 
 class Rows(NamedTuple):
@@ -302,11 +315,6 @@ def _taylor_series(
     loop = rows.loop
     cycle_count = samples.cycle[-1] + 1
     most = int(min(HARMONICS, len(samples.phase) / cycle_count / 4))
-    if harmonics is not None and harmonics > most:
-        raise log.wrong(
-            f"``harmonics`` must be at most {most}, a quarter of the rows of a cycle,"
-            f" got {harmonics}"
-        )
     varies = regression.variation(loop, samples)
     size = rows.joints.knots * cycle_count
     try:

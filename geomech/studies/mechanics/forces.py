@@ -25,7 +25,7 @@ from geomech.mathematics.systems.capabilities import (
     pieces_per_length,
     refined,
 )
-from geomech.run.cost import Cost
+from geomech.runs.cost import Cost
 from geomech.scenes.model import Scene
 from geomech.studies.estimates.cost import direct_jobs, total_cost
 from geomech.studies.estimates.elements import (

@@ -21,7 +21,7 @@ from geomech.mathematics.systems.capabilities import (
     settling,
 )
 from geomech.mathematics.tiers.path import PATH
-from geomech.run.cost import Cost
+from geomech.runs.cost import Cost
 from geomech.scenes.model import Scene
 from geomech.studies.displacement.variables import COMPONENTS, POSE, zero_reason
 from geomech.studies.estimates.cost import (

@@ -16,7 +16,7 @@ from geomech.mathematics.gaits import Gait
 from geomech.mathematics.geometry.connection import check_fit_options
 from geomech.mathematics.geometry.gait import FASTEST
 from geomech.mathematics.geometry.reconstruct import turning
-from geomech.run.runner import runner
+from geomech.runs.runner import runner
 from geomech.scenes.model import Scene
 from geomech.studies.optimisation import evaluators
 from geomech.studies.optimisation import loops as series

@@ -11,7 +11,7 @@ import numpy as np
 from geomech.core.setting import ROUNDING, Setting
 from geomech.core.summary import effect_lines
 from geomech.core.variables import Result, Variable
-from geomech.run.cost import BASE, Cost
+from geomech.runs.cost import BASE, Cost
 from geomech.scenes.terradynamics.intruding import Intruding
 from geomech.studies.settings import Choice, Measurements, choice_variables
 

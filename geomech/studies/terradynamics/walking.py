@@ -15,9 +15,9 @@ import numpy as np
 
 from geomech.core.setting import Setting
 from geomech.core.variables import Variable
-from geomech.run.backend import prefer_backend
-from geomech.run.cost import BASE, Cost, duration
-from geomech.run.runner import runner
+from geomech.runs.backend import prefer_backend
+from geomech.runs.cost import BASE, Cost, duration
+from geomech.runs.runner import runner
 from geomech.scenes import write as written
 from geomech.scenes.terradynamics.walker import WalkerScene
 from geomech.studies.grid import Grid

@@ -37,8 +37,8 @@ IN_PLANE = 1e-9  # rad: largest motion of the fixed joints of a gait in the plan
 class Plane:
     """A plane of shape space.
 
-    pair: the joints that move, from 0, the first on the first axis. at: (d,), a shape
-    that it goes through, rad. connection: of these two joints, columns of the
+    pair: the joints that move, counted from 1, the first on the first axis. at: (d,),
+    a shape that it goes through, rad. connection: of these two joints, columns of the
     least-squares A of all d."""
 
     pair: tuple[int, int]
@@ -57,8 +57,8 @@ class Plane:
 
     @property
     def fixed(self) -> list[int]:
-        """The joints that do not move, from 0."""
-        return [k for k in range(len(self.at)) if k not in self.pair]
+        """The joints that do not move, counted from 1."""
+        return [k for k in range(1, len(self.at) + 1) if k not in self.pair]
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,23 +71,27 @@ class ProjectedGait:
 
     def shape(self, t, amplitudes=None) -> np.ndarray:
         """Return shapes (..., 2) on the plane, as `Gait.shape`."""
-        return self.gait.shape(t, amplitudes)[..., list(self.plane.pair)]
+        return self.gait.shape(t, amplitudes)[..., indices(self.plane.pair)]
 
     @property
     def lies_in_plane(self) -> bool:
         """Whether the gait moves on the plane itself."""
-        fixed = self.plane.fixed
+        fixed = indices(self.plane.fixed)
         shapes = self.gait.shape(np.linspace(0.0, 2 * np.pi, 64))
         distance = shapes[..., fixed] - np.array(self.plane.at)[fixed]
         return bool(np.abs(distance).max(initial=0.0) <= IN_PLANE)
 
 
+def indices(joints: Sequence[int]) -> list[int]:
+    """Return the places in an array of joints counted from 1."""
+    return [k - 1 for k in joints]
+
+
 def checked_pair(pair: Sequence[int], joints: int) -> tuple[int, int]:
-    """Return pair as two different joints from 0; Refusal for any other, with numbers
-    from 1."""
-    are_joints = all(is_whole(k) and 0 <= k < joints for k in pair)
+    """Return pair as two different joints, counted from 1; Refusal for any other."""
+    are_joints = all(is_whole(k) and 1 <= k <= joints for k in pair)
     if len(pair) != 2 or not are_joints or pair[0] == pair[1]:
-        numbers = ", ".join(formatted(k + 1) for k in pair)
+        numbers = ", ".join(map(formatted, pair))
         raise Refusal(f"a pair must be two of the joints 1 to {joints}, got {numbers}")
     return int(pair[0]), int(pair[1])
 
@@ -96,7 +100,7 @@ def plane_shapes(axes, pair: tuple[int, int], at: np.ndarray) -> np.ndarray:
     """Return the shapes (N_i, N_j, d) of the plane of two joints, ``axes`` of each,
     through the shape ``at`` (d,)."""
     alpha = np.broadcast_to(at, (len(axes[0]), len(axes[1]), len(at))).copy()
-    alpha[..., list(pair)] = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
+    alpha[..., indices(pair)] = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
     return alpha
 
 
@@ -114,7 +118,8 @@ def plane(
     length: float | None = None,
     map: Map = each,
 ) -> Plane:
-    """Return the plane of two joints, ``axes`` of each, through the shape ``at`` (d,).
+    """Return the plane of two joints, counted from 1, ``axes`` of each, through the
+    shape ``at`` (d,).
 
     Other arguments are those of `connection.fit`. A is the same: fitted over all
     directions of alphadot, not only those of the two joints."""
@@ -139,7 +144,7 @@ def plane(
         map,
     )
     fitted = Connection(
-        axes, A[:, list(pair)], residual, speed, degree, unit=unit, length=length
+        axes, A[:, indices(pair)], residual, speed, degree, unit=unit, length=length
     )
     return Plane(pair, tuple(at.tolist()), fitted)
 
@@ -151,7 +156,7 @@ def interpolated_plane(fitted: Connection, pair: tuple[int, int], at) -> Plane:
     Refusal off the field, or for a plane that the data do not reach at all."""
     at = fitted.field.inside(real_array("at", at))
     pair = checked_pair(pair, len(fitted.axes))
-    axes = tuple(fitted.axes[k] for k in pair)
+    axes = tuple(fitted.axes[k] for k in indices(pair))
     alpha = plane_shapes(axes, pair, at)
     if isinstance(fitted, Tube):
         A = fitted.taylor.connection_within_reach(alpha)
@@ -159,7 +164,7 @@ def interpolated_plane(fitted: Connection, pair: tuple[int, int], at) -> Plane:
             _refuse_unreached(fitted, pair, at)
     else:
         A = fitted(alpha)
-    A = np.moveaxis(A, (-2, -1), (0, 1))[:, list(pair)]
+    A = np.moveaxis(A, (-2, -1), (0, 1))[:, indices(pair)]
 
     # Files of other programs do not have the residual of their fit.
     residual = np.full((3, *alpha.shape[:-1]), np.nan)
@@ -173,7 +178,7 @@ def interpolated_plane(fitted: Connection, pair: tuple[int, int], at) -> Plane:
 
 def _refuse_unreached(tube: Tube, pair: tuple[int, int], at: np.ndarray) -> NoReturn:
     """Refuse a plane that the data of a measured gait do not reach."""
-    fixed = [f"alpha_{k + 1} = {x:.3g}" for k, x in enumerate(at) if k not in pair]
+    fixed = [f"alpha_{k} = {x:.3g}" for k, x in enumerate(at, 1) if k not in pair]
     start = ",".join(f"{x:.3f}" for x in tube.taylor.loop.shape(np.array(0.0)))
     raise Refusal(
         f"the data do not reach the plane of {', '.join(fixed)}",

@@ -12,8 +12,8 @@ import numpy as np
 
 from geomech.mathematics.geometry.reconstruct import displacement
 from geomech.mathematics.systems import Swimmer
-from geomech.run.backend import prefer_backend
-from geomech.run.cost import assumed_seconds
+from geomech.runs.backend import prefer_backend
+from geomech.runs.cost import assumed_seconds
 from geomech.studies.measured.midlines import intervals, kinematics, smooth
 from geomech.studies.measured.midlines.fit import Kinematics
 from geomech.studies.measured.midlines.kinematics import PHASES, QUANTITIES

@@ -7,7 +7,7 @@ request that was stopped submits the same tasks again, in whatever order, and co
 those whose results are not stored.
 
 `runner()` is the runner of the request under way; `store_results` gives it a file, and
-`geomech.run.workers.using` an executor.
+`geomech.runs.workers.using` an executor.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from pathlib import Path
 from typing import Any
 
 from geomech.core.work import working
-from geomech.run.backend import BACKENDS, VERSION, at_most, fastest, preferred
-from geomech.run.cost import TooLong
-from geomech.run.digest import Undigestible, digest
-from geomech.run.executors import Executor
-from geomech.run.pending import TaskQueue
-from geomech.run.store import CHECKPOINT, Busy, Store
-from geomech.run.tasks import compute, result_type
+from geomech.runs.backend import BACKENDS, VERSION, at_most, fastest, preferred
+from geomech.runs.cost import TooLong
+from geomech.runs.digest import Undigestible, digest
+from geomech.runs.executors import Executor
+from geomech.runs.pending import TaskQueue
+from geomech.runs.store import CHECKPOINT, Busy, Store
+from geomech.runs.tasks import compute, result_type
 from geomech.scenes.kinds import code
 from rft.core.refusal import Refusal
 
@@ -123,7 +123,7 @@ class Runner:
         self, task: Callable, common: Any, item: Any, back_end: str, one_of_many: bool
     ) -> Any:
         """Return task(common, item), computed in this process; see
-        `geomech.run.tasks.compute`."""
+        `geomech.runs.tasks.compute`."""
         with inline_runner():
             return compute(task, common, item, back_end, one_of_many)
 

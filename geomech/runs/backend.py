@@ -34,7 +34,7 @@ __all__ = [
 
 VERSION = f"geomech {version.VERSION}, solver {SOLVER}"
 BACKENDS = ("numpy", "built", "numba")  # slowest first
-# Seconds of balances by NumPy, as `geomech.run.cost` assumes them, about as long as
+# Seconds of balances by NumPy, as `geomech.runs.cost` assumes them, about as long as
 # compiled code takes to load.
 WORTH_LOADING = 1.5
 

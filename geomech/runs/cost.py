@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
-from geomech.run.backend import listen, listener, no_listener, preferred
+from geomech.runs.backend import listen, listener, no_listener, preferred
 from rft.core.refusal import Refusal
 
 LONGEST = 60.0  # s of computing that a command begins without consent

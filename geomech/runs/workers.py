@@ -5,7 +5,7 @@ Large requests are computed in tasks whose results do not depend on the executor
 last digit. `using` is written around a computation and is no argument of it:
 
     with geomech.workers.using(4):
-        study.compute_field()
+        study.tables.compute_field()
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ import contextlib
 import dataclasses
 from collections.abc import Iterator
 
-from geomech.run.backend import at_most, cores, fastest
-from geomech.run.executors import Cluster, Executor, Processes
-from geomech.run.runner import runner, use_runner
+from geomech.runs.backend import at_most, cores, fastest
+from geomech.runs.executors import Cluster, Executor, Processes
+from geomech.runs.runner import runner, use_runner
 from rft.core.checks import in_range
 from rft.core.refusal import Refusal
 

@@ -14,7 +14,7 @@ from concurrent.futures import BrokenExecutor, Future
 from typing import Any, Protocol
 
 from geomech.io.files import note
-from geomech.run.backend import BACKENDS, VERSION, fastest
+from geomech.runs.backend import BACKENDS, VERSION, fastest
 from rft.core.refusal import Refusal, formatted, spell_arguments
 
 PENDING_PER_WORKER = 4  # tasks that are submitted before the oldest is finished
@@ -81,7 +81,7 @@ class Processes:
     def _started_pool(self):
         if self.pool is None:
             # Here, as it loads what starts processes.
-            from geomech.run.spawn import pool
+            from geomech.runs.spawn import pool
 
             self.pool = pool(self.count)
         return self.pool

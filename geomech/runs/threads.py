@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from threadpoolctl import ThreadpoolController
 
-from geomech.run import THREAD_VARIABLES
+from geomech.runs import THREAD_VARIABLES
 
 
 @contextlib.contextmanager

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import context, parent_process, resource_tracker
 
-from geomech.run import THREAD_VARIABLES
+from geomech.runs import THREAD_VARIABLES
 
 TERMINAL_SIGNALS = [
     getattr(signal, name) for name in ("SIGINT", "SIGHUP") if hasattr(signal, name)

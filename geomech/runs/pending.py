@@ -11,10 +11,10 @@ from concurrent.futures import BrokenExecutor
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from geomech.run.backend import preferred
-from geomech.run.cost import is_undecided
-from geomech.run.executors import Executor, defer_signals
-from geomech.run.tasks import (
+from geomech.runs.backend import preferred
+from geomech.runs.cost import is_undecided
+from geomech.runs.executors import Executor, defer_signals
+from geomech.runs.tasks import (
     NotPicklable,
     TaskPayload,
     pack,
@@ -26,7 +26,7 @@ from rft.core.notes import Note
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
-    from geomech.run.runner import Runner
+    from geomech.runs.runner import Runner
 
 # s of computing below which other processes are not worth their start of a second each
 WORTH_PROCESSES = 3.0

@@ -14,8 +14,8 @@ import warnings
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
-from geomech.run.backend import VERSION, one_thread, preferring
-from geomech.run.threads import one_blas_thread
+from geomech.runs.backend import VERSION, one_thread, preferring
+from geomech.runs.threads import one_blas_thread
 from geomech.scenes import kinds
 from rft.core.refusal import Refusal
 
