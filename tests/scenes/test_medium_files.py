@@ -161,6 +161,16 @@ def test_a_table_does_not_overshoot():
     assert (rises * steps >= -1e-12)[row[1:] == row[:-1]].all()
 
 
+def test_a_table_is_constant_beyond_its_last_angles():
+    psi = np.radians([10, 40, 80])
+    table = Table(psi, [1.0, 0.8, 0.1], [0.4, 1.9, 2.5])
+    along = table.traction(np.cos([0.0, psi[0]]), np.sin([0.0, psi[0]]))[0]
+    across = table.traction(np.cos([psi[2], np.pi / 2]), np.sin([psi[2], np.pi / 2]))[1]
+    assert along[0] == pytest.approx(along[1])
+    assert across[0] == pytest.approx(across[1])
+    assert across[0] / along[0] == pytest.approx(2.5)
+
+
 def test_rows_measured_again_are_averaged():
     again = [*PSI, PSI[2], 2 * np.pi - PSI[3]]
     table = Table(again, [*F_T, 0.6, 0.5], [*F_N, 1.3, 1.4])

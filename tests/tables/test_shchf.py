@@ -1,5 +1,7 @@
 """Gaits of sysplotter: numbers, coefficients, points, and paths that it computed."""
 
+import hashlib
+
 import numpy as np
 import pytest
 from scipy.io import savemat
@@ -129,6 +131,8 @@ def test_a_scene_names_its_file(tmp_path):
     scene = scenes.load(tmp_path / "s.toml")
     assert scene.gait == Shchf(file=tmp_path / "a.mat")
     assert tmp_path / "a.mat" in scenes.inputs(scene)
+    digest = hashlib.sha256((tmp_path / "a.mat").read_bytes()).hexdigest()
+    assert scene.gait.sha256 == digest
 
 
 NO_PATH = {"p": {"phi_locus_full": cell(np.zeros((1, 3, 3)), (1,))}}

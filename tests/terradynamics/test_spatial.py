@@ -135,6 +135,15 @@ def test_force_and_moment_are_the_sum_over_faces():
     assert found.moment == pytest.approx(moment, rel=5e-3)
 
 
+@pytest.mark.parametrize(("across", "thick"), [(1, 1), (2, 3)])
+def test_a_leg_has_one_surface_however_it_is_divided(across, thick):
+    mesh = shapes.leg(0.03, 0.8, 0.006, 0.02, along=12, across=across, thick=thick)
+    expected = shapes.leg(0.03, 0.8, 0.006, 0.02, along=12, across=3, thick=1)
+    assert (mesh.areas > 0).all()
+    assert mesh.areas.sum() == pytest.approx(expected.areas.sum(), rel=1e-12)
+    assert mesh.volume == pytest.approx(expected.volume, rel=1e-12)
+
+
 def test_turned_poses_turn_the_wrench_and_batches_agree():
     mesh = shapes.screw(0.03, 0.015, 0.05, 0.2, 24, 40, 2)
     pose = (TURN, PLACE, VELOCITY, SPIN)
