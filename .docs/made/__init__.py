@@ -52,17 +52,20 @@ MADE = {
 def fill_in(app, docname: str, source: list[str]) -> None:
     """Replace the blocks {made} of a page, and add what its commands print, or the
     pictures of the gallery; offer a page with Python as a notebook."""
+    if docname.startswith("generated/"):
+        return
+    link = cells.link(docname, source[0])
     if docname.startswith("gallery/") and docname not in (
         "gallery/index",
         "gallery/figures",
     ):
-        source[0] = examples.shown(docname)
-    elif not docname.startswith("generated/"):
-        text = cells.with_link(docname, source[0])
+        text = examples.shown(docname)
+    else:
         text = re.sub(
-            r"(?m)^```\{made\} (\w+)\n```$", lambda block: MADE[block[1]](), text
+            r"(?m)^```\{made\} (\w+)\n```$", lambda block: MADE[block[1]](), source[0]
         )
-        source[0] = examples.with_output(text)
+        text = examples.with_output(text)
+    source[0] = cells.with_line(text, link)
 
 
 def compute(app) -> None:

@@ -30,24 +30,30 @@ def is_executed(text: str) -> bool:
     return text.startswith("---\n" + EXECUTED)
 
 
-def with_link(docname: str, text: str) -> str:
-    """Return a page with a link to its notebook below its title, where it has Python;
-    write the notebook, or the files that an executed page writes."""
+def link(docname: str, text: str) -> str:
+    """Return the sentence that links to the notebook of a page, "" of the front page
+    and of a page without Python; write the notebook, or the files that an executed page
+    writes."""
     name = docname.rpartition("/")[2]
     if is_executed(text):
         for file, content in WRITTEN.findall(text):
             FILES.mkdir(parents=True, exist_ok=True)
             (FILES / file).write_text(content, encoding="utf-8")
-        link = f"{{nb-download}}`{name}.ipynb <{name}.ipynb>`"
-    elif re.search(r"(?m)^```python( |$)", text):
-        path = FOLDER / f"{docname}.ipynb"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        nbformat.write(from_page(text), path)
-        link = f"{{download}}`{name}.ipynb </generated/notebooks/{docname}.ipynb>`"
-    else:
+        return f"{LINK}{{nb-download}}`{name}.ipynb <{name}.ipynb>`."
+    if docname == "index" or not re.search(r"(?m)^```python( |$)", text):
+        return ""
+    path = FOLDER / f"{docname}.ipynb"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    nbformat.write(from_page(text), path)
+    return f"{LINK}{{download}}`{name}.ipynb </generated/notebooks/{docname}.ipynb>`."
+
+
+def with_line(text: str, line: str) -> str:
+    """Return a page with a line below its title."""
+    if not line:
         return text
     title = re.search(r"(?m)^# .*\n", text)
-    return f"{text[: title.end()]}\n{LINK}{link}.\n{text[title.end() :]}"
+    return f"{text[: title.end()]}\n{line}\n{text[title.end() :]}"
 
 
 def from_page(text: str) -> nbformat.NotebookNode:
