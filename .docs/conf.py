@@ -28,7 +28,7 @@ extensions = [
     "sphinx_copybutton",
     "made",
 ]
-exclude_patterns = ["made/**"]
+exclude_patterns = ["made/**", "generated/notebooks/**"]
 nitpicky = True
 nitpick_ignore_regex = [
     ("py:.*", ".*")

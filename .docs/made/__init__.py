@@ -12,7 +12,17 @@ from pathlib import Path
 
 from sphinx.util import logging
 
-from . import api, command_line, conventions, examples, figures, keys, lab, validation
+from . import (
+    api,
+    cells,
+    command_line,
+    conventions,
+    examples,
+    figures,
+    keys,
+    lab,
+    validation,
+)
 
 
 def notebooks() -> str:
@@ -41,17 +51,21 @@ MADE = {
 
 def fill_in(app, docname: str, source: list[str]) -> None:
     """Replace the blocks {made} of a page, and add what its commands print, or the
-    pictures of the gallery."""
+    pictures of the gallery; offer a page with Python as a notebook."""
+    if docname.startswith("generated/"):
+        return
+    link = cells.link(docname, source[0])
     if docname.startswith("gallery/") and docname not in (
         "gallery/index",
         "gallery/figures",
     ):
-        source[0] = examples.shown(docname)
-    elif not docname.startswith("generated/"):
+        text = examples.shown(docname)
+    else:
         text = re.sub(
             r"(?m)^```\{made\} (\w+)\n```$", lambda block: MADE[block[1]](), source[0]
         )
-        source[0] = examples.with_output(text)
+        text = examples.with_output(text)
+    source[0] = cells.with_line(text, link)
 
 
 def compute(app) -> None:
@@ -64,12 +78,15 @@ def compute(app) -> None:
     examples.compute_all()
     figures.draw_missing()
     lab.write()
+    cells.prepare()
 
 
 def setup(app) -> dict[str, bool]:
     """Register the computations with Sphinx."""
     app.connect("builder-inited", compute)
     app.connect("source-read", fill_in)
+    app.connect("doctree-read", cells.clean)
+    app.connect("env-updated", cells.join_tour)
     app.connect(
         "autodoc-process-docstring", api.readable, priority=400
     )  # before numpydoc

@@ -2,6 +2,7 @@
 code, as they stand there. The site's build (`.ci/docs`) runs the examples of the
 gallery and the notebooks, and finds pages that no other leads to."""
 
+import importlib.util
 import itertools
 import pathlib
 import re
@@ -152,7 +153,8 @@ def test_what_readme_and_start_say_to_type_runs(line, tmp_path, monkeypatch):
     assert files == {p.name for p in tmp_path.iterdir()}
 
 
-BUILT = SITE / "gallery", SITE / "notebooks"  # whose code the site's build runs
+# Whose code the site's build runs.
+BUILT = SITE / "gallery", SITE / "notebooks", SITE / "tour"
 WITH_PYTHON = {page.relative_to(ROOT).as_posix(): page for page in PAGES
                if page.parent not in BUILT and blocks(page, "python")}  # fmt: skip
 
@@ -174,3 +176,39 @@ def test_python_on_all_pages_runs(page, tmp_path, capsys, monkeypatch, own_parts
         assert re.sub(NUMBER, "#", out) == re.sub(NUMBER, "#", said)
         numbers = [[float(x) for x in re.findall(NUMBER, y)] for y in (out, said)]
         assert numbers[0] == pytest.approx(numbers[1], rel=1e-4)
+
+
+@pytest.fixture(scope="module")
+def cells():
+    """The module of the site's build that turns pages into notebooks."""
+    pytest.importorskip("nbformat", reason="of the extra docs")
+    spec = importlib.util.spec_from_file_location("cells", SITE / "made" / "cells.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+OFFERED = {page.relative_to(ROOT).as_posix(): page for page in PAGES
+           if SITE in page.parents and blocks(page, "python")
+           and "file_format: mystnb" not in text(page)}  # fmt: skip
+
+
+@pytest.mark.parametrize("page", OFFERED.values(), ids=OFFERED)
+def test_the_notebook_of_a_page_has_its_files_commands_and_python(cells, page):
+    notebook = cells.from_page(text(page))
+    found = [x.source for x in notebook.cells if x.cell_type == "code"]
+    assert [x for x in found if x[0] not in "%!"] == [
+        code.strip() for code in blocks(page, "python")
+    ]
+    named = re.findall(r"(?m)^```\w+ ([\w.-]+)$", text(page))
+    assert [x.split()[1] for x in found if x.startswith("%%writefile")] == named
+    typed = "\n".join(blocks(page, "console")).replace("$ ", "!")
+    assert "\n".join(x for x in found if x.startswith("!")).split() == typed.split()
+
+
+@pytest.mark.parametrize("page", OFFERED.values(), ids=OFFERED)
+def test_the_notebook_of_a_page_has_no_links_into_the_site(cells, page):
+    notebook = cells.from_page(text(page))
+    prose = "\n".join(x.source for x in notebook.cells if x.cell_type == "markdown")
+    assert prose.startswith("# ")
+    assert not re.search(r"\]\((?![a-z]+:)|^:::|^```\{|\{\w+\}`", prose, re.M)
