@@ -12,7 +12,17 @@ from pathlib import Path
 
 from sphinx.util import logging
 
-from . import api, command_line, conventions, examples, figures, keys, lab, validation
+from . import (
+    api,
+    command_line,
+    conventions,
+    examples,
+    figures,
+    keys,
+    lab,
+    pictures,
+    validation,
+)
 
 
 def notebooks() -> str:
@@ -70,6 +80,7 @@ def setup(app) -> dict[str, bool]:
     """Register the computations with Sphinx."""
     app.connect("builder-inited", compute)
     app.connect("source-read", fill_in)
+    app.connect("doctree-resolved", pictures.mark)
     app.connect(
         "autodoc-process-docstring", api.readable, priority=400
     )  # before numpydoc
