@@ -20,8 +20,10 @@ from . import (
     figures,
     keys,
     lab,
+    paper,
     pictures,
     validation,
+    words,
 )
 
 
@@ -57,11 +59,13 @@ def fill_in(app, docname: str, source: list[str]) -> None:
         "gallery/figures",
     ):
         source[0] = examples.shown(docname)
+    elif docname == "paper":
+        source[0] = paper.shown(source[0])
     elif not docname.startswith("generated/"):
         text = re.sub(
             r"(?m)^```\{made\} (\w+)\n```$", lambda block: MADE[block[1]](), source[0]
         )
-        source[0] = examples.with_output(text)
+        source[0] = examples.with_output(words.with_entries(docname, text))
 
 
 def compute(app) -> None:
