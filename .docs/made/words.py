@@ -1,7 +1,8 @@
 """Words that users type into the search, and the page or section that answers each.
 
 The search finds the words of a page by itself. An entry here puts a page first, or
-leads to it by a word that it does not use. A word may stand for several pages.
+leads to it by a word that it does not use. A word may stand for several pages; an entry
+of a page that does not exist does nothing.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ WORDS = {
     "start": "units, degrees, conventions, body length",
     "tiers": "accuracy, exact, which method",
     "lab": "interactive, app, browser, lecture",
+    "how-to/figures": "font, figure size, DPI, colormap, legend, mplstyle, SVG, PDF",
     "how-to/mujoco": "MJCF, URDF, sand in MuJoCo",
     "how-to/mujoco#learning": "learning, reinforcement learning, RL, gymnasium",
     "how-to/own-sand": "drag coefficient, drag test, calibrate, own robot",
