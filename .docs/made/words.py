@@ -48,7 +48,9 @@ def with_entries(docname: str, text: str) -> str:
         page, _, anchor = place.partition("#")
         if page == docname:
             end = _end_of_heading(text, anchor, place)
-            entry = f"\n```{{index}} {words}\n```\n"
+            # Only the main entries of a word stand before other results.
+            main = ", ".join(f"!{word}" for word in words.split(", "))
+            entry = f"\n```{{index}} {main}\n```\n"
             text = text[:end] + entry + text[end:]
     return text
 
