@@ -12,7 +12,7 @@ from pathlib import Path
 HERE = Path(__file__).parents[1]
 ENTRY = re.compile(r"(?ms)^@\w+\{(\w+),\n(.*?)^\}")
 FIELD = re.compile(r"(?m)^  (\w+) = \{(.*)\},?$")
-CITED = re.compile(r"\[(@\w+(?:; @\w+)*)\]")
+CITED = re.compile(r"\[(@\w+(?:;\s@\w+)*)\]")
 
 
 def shown(text: str) -> str:
@@ -43,7 +43,7 @@ def bibliography() -> dict[str, dict[str, str]]:
 
 
 def _keys(citation: str) -> list[str]:
-    return [key.removeprefix("@") for key in citation.split("; ")]
+    return [key.removeprefix("@") for key in citation.replace("\n", " ").split("; ")]
 
 
 def _name(entry: dict[str, str]) -> str:
