@@ -66,19 +66,22 @@ ALONE = (
     "start",
     "lab",
     "tiers",
+    "choosing",
     "validation",
+    "coming-from",
     "glossary",
+    "paper",
     "changelog",
     "citing",
 )
 html_sidebars = {page: [] for page in ALONE}
-html_context = {"default_mode": "light"}
+html_context = {"default_mode": "auto"}  # light or dark as the browser prefers
 html_theme_options = {
     "logo": {"text": "geomech"},
     "navigation_with_keys": False,
     "show_prev_next": False,
     "navbar_align": "left",
-    "header_links_before_dropdown": 10,
+    "header_links_before_dropdown": 6,
     "show_toc_level": 2,
     "secondary_sidebar_items": {"**": ["page-toc"], "index": []},
     "footer_start": ["copyright"],

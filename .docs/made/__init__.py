@@ -21,7 +21,10 @@ from . import (
     figures,
     keys,
     lab,
+    paper,
+    pictures,
     validation,
+    words,
 )
 
 
@@ -60,11 +63,13 @@ def fill_in(app, docname: str, source: list[str]) -> None:
         "gallery/figures",
     ):
         text = examples.shown(docname)
+    elif docname == "paper":
+        text = paper.shown(source[0])
     else:
         text = re.sub(
             r"(?m)^```\{made\} (\w+)\n```$", lambda block: MADE[block[1]](), source[0]
         )
-        text = examples.with_output(text)
+        text = examples.with_output(words.with_entries(docname, text))
     source[0] = cells.with_line(text, link)
 
 
@@ -87,6 +92,7 @@ def setup(app) -> dict[str, bool]:
     app.connect("source-read", fill_in)
     app.connect("doctree-read", cells.clean)
     app.connect("env-updated", cells.join_tour)
+    app.connect("doctree-resolved", pictures.mark)
     app.connect(
         "autodoc-process-docstring", api.readable, priority=400
     )  # before numpydoc

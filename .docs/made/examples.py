@@ -2,7 +2,8 @@
 
 On any page, a block ```LANGUAGE FILE is a file of that name. The commands of a block
 ```console, each after `$ `, are run in the folder of the page's files, after the
-programs of the page, and are followed by what they print. On a page of the gallery the
+programs of the page, and are followed by what they print. An empty block ```printed
+becomes what the last program ```python before it prints. On a page of the gallery the
 commands of a block ```sh and the programs of a block ```python are run, the picture of
 the command is shown, and the scene is added.
 """
@@ -40,19 +41,31 @@ def run(code: str, folder: Path, program: bool = False) -> str:
 
 
 def with_output(text: str) -> str:
-    """Return a page in which every command is followed by what it prints."""
-    if "```console\n" not in text:
+    """Return a page in which every command is followed by what it prints, and every
+    program for which the page asks for it."""
+    if "```console\n" not in text and "```printed\n" not in text:
         return text
-    with tempfile.TemporaryDirectory() as folder:
-        return BLOCK.sub(lambda block: _shown(block, Path(folder)), text)
+    printed = ""
+    parts = []
+    end = 0
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for block in BLOCK.finditer(text):
+            if block[1] == "python":
+                printed = run(block[3], folder, program=True)
+            if block[1] == "printed":
+                shown = f"```text\n{printed.rstrip()}\n```"
+            else:
+                shown = _shown(block, folder)
+            parts += [text[end : block.start()], shown]
+            end = block.end()
+    return "".join([*parts, text[end:]])
 
 
 def _shown(block: re.Match, folder: Path) -> str:
     language, name, code = block.groups()
     if name:
         (folder / name).write_text(code)
-    if language == "python":
-        run(code, folder, program=True)
     if language == "csv":
         return f"```text\n{code}```"
     if language != "console":

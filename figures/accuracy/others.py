@@ -2,10 +2,11 @@
 problems, in one run.
 
 `python -m figures.accuracy.others` prints rows of tables. Programs take turns, and the
-quickest of several calls counts. Two of the programs are not dependencies of geomech.
+quickest of several calls counts. Three of the programs are not dependencies of geomech.
 They are left out if they are not installed:
 
 - ElegansBot: `pip install elegansbot`
+- PyElastica: `pip install pyelastica`
 - sysplotter: a copy of github.com/OSU-LRAM/GeometricSystemPlotter, whose folder the
   environment names as SYSPLOTTER, and GNU Octave (`apt-get install octave`)
 """
@@ -45,6 +46,11 @@ THREE_LINKS = Chain(frame="link-2")
 WORM_PERIOD = 1.6  # s, of ElegansBot's example of a worm on agar
 WORM_SETTLES = 9  # cycles until its shapes repeat to 1e-6 rad
 WORM_PHASES = 1600  # times in a cycle at which its muscles are told what to do
+ROD_ELEMENTS = 50
+ROD_STEPS = 10_000  # in a cycle of PyElastica's flagellum, as in its example
+ROD_PHASES = 400  # of them, whose shapes are recorded
+ROD_EVERY = 10  # of these shapes our balance takes one in ten
+ROD_SETTLES = 5  # cycles until its shapes repeat
 PHASES = 32  # of our balance in a cycle of the worm
 
 
@@ -218,6 +224,113 @@ def periodic(shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return shapes, np.fft.ifft(1j * order[:, None] * waves, axis=0).real
 
 
+# A cycle of PyElastica's flagellum
+
+
+def flagellum() -> list[Row]:
+    """Return a row of a cycle in a viscous fluid: PyElastica bends 50 elements by
+    muscles, we move the elements through the shapes that it found."""
+    if importlib.util.find_spec("elastica") is None:
+        print("PyElastica is missing: pip install pyelastica")
+        return []
+    rod = Flagellum()
+    for _ in range(ROD_SETTLES):
+        rod.cycle()
+    headings, net = rod.cycle()
+    alpha, alphadot = periodic(np.diff(headings[:-1], axis=1))
+    shapes = alpha[::ROD_EVERY]
+    rates = alphadot[::ROD_EVERY]
+
+    def our_cycle(how):
+        solution = body_velocity(
+            Viscous(2.0), Backbone(ROD_ELEMENTS), shapes, rates, backend=how
+        )
+        return displacement(solution.xi)
+
+    programs = {"theirs": rod.cycle}
+    for how in backends():
+        programs[how] = functools.partial(our_cycle, how)
+    took = in_turn(programs)
+    off = np.hypot(*(our_cycle("numpy") - net)[:2])
+    return [
+        Row(
+            "a cycle of 50 elements in a viscous fluid, drag ratio 2",
+            f"PyElastica {version('pyelastica')}, {ROD_STEPS:,} steps, its example's",
+            took["theirs"],
+            {how: took[how] for how in backends()},
+            f"{np.hypot(*net[:2]):.4f} BL, {off:.0e} from ours",
+        )
+    ]
+
+
+class Flagellum:
+    """The rod of PyElastica's example of a flagellum (Gazzola et al. 2018, section
+    5.2.1): 1 m long, a period of 1 s, bent by a wave of muscle torques."""
+
+    def __init__(self):
+        import elastica as ea
+
+        class Simulator(ea.BaseSystemCollection, ea.Forcing, ea.Damping):
+            pass
+
+        across = np.array([0.0, 1.0, 0.0])
+        along = np.array([0.0, 0.0, 1.0])
+        youngs = 1e7  # Pa
+        self.rod = ea.CosseratRod.straight_rod(
+            ROD_ELEMENTS,
+            np.zeros(3),
+            along,
+            across,
+            1.0,  # m long
+            0.025,  # m in radius
+            1000.0,  # kg/m^3
+            youngs_modulus=youngs,
+            shear_modulus=youngs / 1.5,
+        )
+        self.simulator = Simulator()
+        self.simulator.append(self.rod)
+        self.simulator.add_forcing_to(self.rod).using(
+            ea.MuscleTorques,
+            base_length=1.0,
+            b_coeff=np.array([0.0, 17.4, 48.5, 5.4, 14.7, 0.0]),
+            period=1.0,
+            wave_number=2 * np.pi / 0.38,
+            phase_shift=0.0,
+            rest_lengths=self.rod.rest_lengths,
+            ramp_up_time=1.0,
+            direction=across,
+            with_spline=True,
+        )
+        # Pa s: a Reynolds number of 1e-4 at a density of 1 kg/m^3
+        self.simulator.add_forcing_to(self.rod).using(
+            ea.SlenderBodyTheory, dynamic_viscosity=1e4
+        )
+        self.simulator.dampen(self.rod).using(
+            ea.AnalyticalLinearDamper, damping_constant=0.625, time_step=1 / ROD_STEPS
+        )
+        self.simulator.finalize()
+        self.stepper = ea.PositionVerlet()
+        self.time = 0.0
+
+    def pose(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the elements' headings, from the tail, and the pose of the body."""
+        along, up = self.rod.position_collection[[2, 0]]
+        headings = np.unwrap(np.arctan2(np.diff(up), np.diff(along)))
+        middle = [np.mean((x[1:] + x[:-1]) / 2) for x in (along, up)]
+        return headings, np.array([*middle, headings.mean()])
+
+    def cycle(self) -> tuple[np.ndarray, np.ndarray]:
+        """Move the rod for a cycle; return the headings at all phases, both ends
+        included, and the net pose (3,) in body lengths."""
+        first, start = self.pose()
+        headings = [first]
+        for _ in range(ROD_PHASES):
+            for _ in range(ROD_STEPS // ROD_PHASES):
+                self.time = self.stepper.step(self.simulator, self.time, 1 / ROD_STEPS)
+            headings.append(self.pose()[0])
+        return np.array(headings), se2.compose(se2.inverse(start), self.pose()[1])
+
+
 # Connection and CCF by sysplotter
 
 
@@ -330,7 +443,7 @@ def walk(model, count: int) -> np.ndarray:
 def compute() -> tuple[list[Row], dict[str, float]]:
     """Return rows of all comparisons, and seconds of MuJoCo's steps."""
     with one_blas_thread():
-        return samples() + worm() + connections(), hexapod_steps()
+        return samples() + worm() + flagellum() + connections(), hexapod_steps()
 
 
 def main() -> None:

@@ -1,6 +1,6 @@
 // Numbers of a cycle by every tier, and displacement against amplitude.
 
-const STYLES = { harmonic: ["#00795a", ""], path: ["#0072b2", "9 3 2 3"], area: ["#c04f00", "5 4"] };
+const STYLES = { harmonic: ["var(--harmonic)", ""], path: ["var(--path)", "9 3 2 3"], area: ["var(--area)", "5 4"] };
 const AMPLITUDES = 16, COARSE = 64;  // of the curves, and phases of each
 const CURVE = { height: 250, left: 58, right: 12, top: 12, bottom: 40 };
 
@@ -58,18 +58,18 @@ function drawCurve() {
   const x = (a) => left + a / most * (width - left - right), y = (v) => top + (high - v) / (high - low) * (height - top - bottom);
   const at = (a, v) => `${x(a).toFixed(1)} ${y(v).toFixed(1)}`, svg = drawn("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": "Displacement against amplitude" });
   for (const t of ticks(low, high, 4)) {
-    svg.append(drawn("path", { d: `M${left} ${y(t)}H${width - right}`, stroke: Math.abs(t) < 1e-12 ? "#777" : "#e3e7eb" }), drawn("text", { x: left - 8, y: y(t) + 4, "text-anchor": "end" }, tickText(t)));
+    svg.append(drawn("path", { d: `M${left} ${y(t)}H${width - right}`, stroke: Math.abs(t) < 1e-12 ? "var(--zero)" : "var(--grid)" }), drawn("text", { x: left - 8, y: y(t) + 4, "text-anchor": "end" }, tickText(t)));
   }
-  for (const t of ticks(0, most, 6)) svg.append(drawn("path", { d: `M${x(t)} ${height - bottom}v4`, stroke: "#555" }), drawn("text", { x: x(t), y: height - bottom + 18, "text-anchor": "middle" }, tickText(t)));
+  for (const t of ticks(0, most, 6)) svg.append(drawn("path", { d: `M${x(t)} ${height - bottom}v4`, stroke: "var(--axis)" }), drawn("text", { x: x(t), y: height - bottom + 18, "text-anchor": "middle" }, tickText(t)));
   const names = `${COMPONENTS[c]} a cycle (${c < 2 ? chart.unit : "rad"})`;
   svg.append(drawn("text", { x: (left + width - right) / 2, y: height - 4, "text-anchor": "middle" }, "amplitude"), drawn("text", { transform: `translate(13 ${(top + height - bottom) / 2}) rotate(-90)`, "text-anchor": "middle" }, names));
   const band = [...rowsOf.harmonic.map(([a, v, e]) => at(a, v + e)), ...rowsOf.harmonic.map(([a, v, e]) => at(a, v - e)).reverse()];
   if (band.length) svg.append(drawn("path", { d: `M${band.join("L")}Z`, fill: STYLES.harmonic[0], "fill-opacity": 0.18 }));
-  svg.append(drawn("path", { d: `M${x(Math.abs(state.amplitude))} ${top}V${height - bottom}`, stroke: "#888", "stroke-dasharray": "2 4" }));
+  svg.append(drawn("path", { d: `M${x(Math.abs(state.amplitude))} ${top}V${height - bottom}`, stroke: "var(--zero)", "stroke-dasharray": "2 4" }));
   for (const tier of [...TIERS].reverse()) {
     const [stroke, dashes] = STYLES[tier], points = rowsOf[tier].map(([a, v]) => at(a, v));
     if (points.length) svg.append(drawn("path", { d: `M${points.join("L")}`, fill: "none", stroke, "stroke-width": 2, "stroke-dasharray": dashes }));
-    if (shown.prediction && state.amplitude >= 0) svg.append(drawn("circle", { cx: x(state.amplitude), cy: y(shown.prediction[tier].net[c]), r: 4.5, fill: tier === "harmonic" ? stroke : "#fff", stroke, "stroke-width": 1.8 }));
+    if (shown.prediction && state.amplitude >= 0) svg.append(drawn("circle", { cx: x(state.amplitude), cy: y(shown.prediction[tier].net[c]), r: 4.5, fill: tier === "harmonic" ? stroke : "var(--page)", stroke, "stroke-width": 1.8 }));
   }
   box.replaceChildren(svg);
 }

@@ -144,17 +144,17 @@ function definitions(k) {
   return all;
 }
 
-const frameOf = () => drawn("rect", { x: MARGIN.left, y: MARGIN.top, width: map.size, height: map.size, fill: "none", stroke: "#555" });
+const frameOf = () => drawn("rect", { x: MARGIN.left, y: MARGIN.top, width: map.size, height: map.size, fill: "none", stroke: "#555", class: "axis" });
 
 function axes(chart, height) {
   const bottom = MARGIN.top + map.size, middle = map.size / 2;
   const marks = ticks(chart.low[0], chart.high[0], 6).flatMap((t) => {
     const [x] = toMap([t, 0]);
-    return [drawn("path", { d: `M${x} ${bottom}v4`, stroke: "#555" }), drawn("text", { x, y: bottom + 17, "text-anchor": "middle" }, tickText(t))];
+    return [drawn("path", { d: `M${x} ${bottom}v4`, stroke: "#555", class: "axis" }), drawn("text", { x, y: bottom + 17, "text-anchor": "middle" }, tickText(t))];
   });
   marks.push(...ticks(chart.low[1], chart.high[1], 6).flatMap((t) => {
     const [, y] = toMap([0, t]);
-    return [drawn("path", { d: `M${MARGIN.left} ${y}h-4`, stroke: "#555" }), drawn("text", { x: MARGIN.left - 8, y: y + 4, "text-anchor": "end" }, tickText(t))];
+    return [drawn("path", { d: `M${MARGIN.left} ${y}h-4`, stroke: "#555", class: "axis" }), drawn("text", { x: MARGIN.left - 8, y: y + 4, "text-anchor": "end" }, tickText(t))];
   }));
   const below = drawn("text", { x: MARGIN.left + middle, y: height - 6, "text-anchor": "middle" }, shapeName(chart, 0));
   const beside = drawn("text", { transform: `translate(14 ${MARGIN.top + middle}) rotate(-90)`, "text-anchor": "middle" }, shapeName(chart, 1));
@@ -171,10 +171,10 @@ function scale(chart, { top, empty }) {
   const left = MARGIN.left + map.size + 14, unit = state.component === 2 ? "rad" : chart.unit;
   const marks = (empty ? [0] : ticks(-top, top, 8)).flatMap((t) => {
     const y = MARGIN.top + map.size * (0.5 - t / top / 2);
-    return [drawn("path", { d: `M${left + 12} ${y}h3`, stroke: "#555" }), drawn("text", { x: left + 18, y: y + 4 }, tickText(t))];
+    return [drawn("path", { d: `M${left + 12} ${y}h3`, stroke: "#555", class: "axis" }), drawn("text", { x: left + 18, y: y + 4 }, tickText(t))];
   });
   const name = empty ? "CCF: zero by symmetry" : `CCF, ${DIRECTIONS[state.component]} (${unit}/rad²)`;
-  const bar = drawn("rect", { x: left, y: MARGIN.top, width: 12, height: map.size, fill: "url(#colours)", stroke: "#555" });
+  const bar = drawn("rect", { x: left, y: MARGIN.top, width: 12, height: map.size, fill: "url(#colours)", stroke: "#555", class: "axis" });
   return [bar, ...marks, drawn("text", { x: left + 12, y: 16, "text-anchor": "end" }, name)];
 }
 

@@ -92,12 +92,12 @@ function newWorld() {
   world.width = Math.max(280, box.clientWidth);
   const svg = drawn("svg", { viewBox: `0 0 ${world.width} ${HEIGHT}`, role: "img", "aria-label": "The body on its way, seen from above" });
   const stroke = { fill: "none", "stroke-linecap": "round", "stroke-linejoin": "round" };
-  world.dotsPart = drawn("path", { ...stroke, stroke: "#b9b2a2", "stroke-width": 2.5 });
-  world.ghostsPart = drawn("path", { ...stroke, stroke: "#1b4965", "stroke-opacity": 0.16, "stroke-width": 6 });
-  world.trailPart = drawn("path", { ...stroke, stroke: "#c77d00", "stroke-width": 1.4 });
-  world.bodyPart = drawn("path", { ...stroke, stroke: "#1b4965", "stroke-width": 8 });
-  world.headPart = drawn("path", { ...stroke, stroke: "#d1495b", "stroke-width": 12 });
-  world.scalePart = drawn("path", { fill: "none", stroke: "#333" });
+  world.dotsPart = drawn("path", { ...stroke, stroke: "var(--dots)", "stroke-width": 2.5 });
+  world.ghostsPart = drawn("path", { ...stroke, stroke: "var(--body)", "stroke-opacity": 0.16, "stroke-width": 6 });
+  world.trailPart = drawn("path", { ...stroke, stroke: "var(--trail)", "stroke-width": 1.4 });
+  world.bodyPart = drawn("path", { ...stroke, stroke: "var(--body)", "stroke-width": 8 });
+  world.headPart = drawn("path", { ...stroke, stroke: "var(--head)", "stroke-width": 12 });
+  world.scalePart = drawn("path", { fill: "none", stroke: "var(--axis)" });
   world.scaleText = drawn("text", { y: HEIGHT - 18, "text-anchor": "middle" });
   world.text = drawn("text", { x: world.width - 10, y: 18, "text-anchor": "end" });
   svg.append(world.dotsPart, world.ghostsPart, world.trailPart, world.bodyPart, world.headPart, world.scalePart, world.scaleText, world.text);

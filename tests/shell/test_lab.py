@@ -345,6 +345,47 @@ def test_predictions_and_pictures_are_saved(opened, page):
     np.testing.assert_allclose(numbers, [*expected.net, *expected.error], atol=1e-6)
 
 
+@pytest.fixture
+def preferring(opened):
+    """A function that lets the browser prefer light or dark colours."""
+
+    def prefer(colours):
+        features = [{"name": "prefers-color-scheme", "value": colours}]
+        opened.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+
+    yield prefer
+    prefer("")
+
+
+# Of the page, and of its texts but for those of pressed buttons, as CSS defines it.
+LUMINANCES = """(() => {
+  const luminance = (colour) => {
+    const [r, g, b] = colour.match(/[\\d.]+/g).map((x) => x / 255)
+      .map((x) => (x > 0.04045 ? ((x + 0.055) / 1.055) ** 2.4 : x / 12.92));
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  };
+  const page = getComputedStyle(document.body).backgroundColor;
+  const texts = [...document.querySelectorAll("main :not([aria-pressed=true])")].filter((element) =>
+    [...element.childNodes].some((node) => node.nodeType === 3 && node.data.trim()));
+  return [page, ...texts.map((element) => {
+    const style = getComputedStyle(element);
+    return element.namespaceURI.endsWith("svg") ? style.fill : style.color;
+  })].map(luminance);
+})()"""
+
+
+def test_dark_where_the_browser_prefers_it_and_the_saved_map_is_not(opened, preferring):
+    click(opened, "#play")  # the map has a dot that moves with the swimmer
+    preferring("light")
+    light = saved(opened, "svg").read_text(encoding="utf-8")
+    preferring("dark")
+    background, *texts = js(opened, LUMINANCES)
+    assert background < 0.05
+    assert (min(texts) + 0.05) / (background + 0.05) > 4.5
+    assert saved(opened, "svg").read_text(encoding="utf-8") == light
+    assert "var(" not in light
+
+
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
