@@ -66,7 +66,7 @@ class NoSlipSnake:
             joint_angles=True,
             frame=self.frame,
             singularity=self._determinant,
-            singular="the wheels' axles meet in one point",
+            singular="the axles of the wheels meet in one point",
         )
 
     @property
@@ -91,8 +91,8 @@ class NoSlipSnake:
 
     def about(self) -> dict:
         where = (
-            f"nan, where {self.traits.singular}, and where they lie between a grid"
-            " point and the next"
+            f"nan, where {self.traits.singular}, and where they lie between two grid "
+            "points"
         )
         return {"singular_shapes": where}
 
