@@ -203,7 +203,8 @@ def variables(raw: bytes, names: Collection[str]) -> dict[str, Any]:
         return hdf5.arrays(raw, names)
     if raw[:3] == b"CDF":
         raise Refusal(
-            "is a NetCDF file, not a MATLAB file", instead="change the ending of its name to .nc"
+            "is a NetCDF file, not a MATLAB file",
+            instead="change the ending of its name to .nc",
         )
     try:
         if raw[:4] and 0 in raw[:4]:

@@ -56,7 +56,7 @@ class Sweep(Question):
         if len(self.over) > LARGEST_DRAWN:
             raise Refusal(
                 f"cannot draw {len(self.over)} parameters",
-                instead="sweep one or two, or leave ``plot`` out",
+                instead="sweep one or two parameters, or leave ``plot`` out",
             )
 
     def cost(self) -> Cost:

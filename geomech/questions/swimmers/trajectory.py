@@ -35,7 +35,7 @@ class Trajectory(Question):
     scene: Annotated["Scene", Subject(loading.load_scene, names.scene_names)]
     cycles: Annotated[
         int | None,
-        Option("cycles of the gait, 3 in a film and else 1 if left out", "N"),
+        Option("cycles of the gait (default 1, in a film 3)", "N"),
     ] = None
     # Whether the CCF is computed, on which pictures show the shape; whether a film is
     # drawn, whose cost counts.
@@ -104,7 +104,7 @@ class Trajectory(Question):
             cycles = f"{count} cycles"
         return [
             f"{facts['scene']}: motion of the frame {facts['frame']} over {cycles}",
-            "x ahead, y to the left, as the frame points at phase 0",
+            "x ahead, y to the left, along the frame at phase 0",
         ]
 
     @staticmethod

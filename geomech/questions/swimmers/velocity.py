@@ -21,12 +21,16 @@ class Velocity(Question):
     alpha: Annotated[
         tuple[float, ...],
         Option(
-            "joint angles in rad, as 0.5,0.3 or 30deg,20deg", "ANGLES", parsing.angles
+            "joint angles in rad, such as 0.5,0.3 or 30deg,20deg",
+            "ANGLES",
+            parsing.angles,
         ),
     ]
     alphadot: Annotated[
         tuple[float, ...],
-        Option("joint rates in rad per unit of time, as 1,0", "RATES", parsing.angles),
+        Option(
+            "joint rates in rad per unit of time, such as 1,0", "RATES", parsing.angles
+        ),
     ]
 
     name: ClassVar[str] = "velocity"

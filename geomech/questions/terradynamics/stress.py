@@ -22,11 +22,11 @@ class Stress(Question):
     ]
     beta: Annotated[
         float | None,
-        Option("tilt of the plate in degrees, 0 if it lies flat", "ANGLE"),
+        Option("tilt of the plate in degrees (0 lies flat)", "ANGLE"),
     ] = None
     gamma: Annotated[
         float | None,
-        Option("direction of motion in degrees below the horizontal", "ANGLE"),
+        Option("direction of motion, degrees below the horizontal", "ANGLE"),
     ] = None
     # Whether the map of all angles is computed, for pictures.
     drawn: bool = field(default=True, kw_only=True)
