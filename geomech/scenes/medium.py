@@ -33,8 +33,8 @@ class NamedMedium:
         str,
         Word(
             MEDIA,
-            f"a medium of the catalogue: {', '.join(MEDIA)}; 'geomech scenes --show "
-            "NAME' prints one",
+            f"name of a medium in the catalogue: {', '.join(MEDIA)}; 'geomech scenes "
+            "--show NAME' prints one",
         ),
     ]
 
@@ -84,7 +84,7 @@ def _medium_table(place: str, path: Path) -> dict:
     table = tables.get("medium", tables)
     if not isinstance(table, dict) or (table is not tables and len(tables) > 1):
         raise Refusal(
-            f"{path.name} must hold one table [medium] and nothing else", where=place
+            f"{path.name} must contain one table [medium] and nothing else", where=place
         )
     if not {"law", "name"} & {*table}:
         raise Refusal(
@@ -125,7 +125,7 @@ def _drag_table(place: str, file: str) -> dict[str, list]:
 
 DRAG = FromFile(
     _drag_table,
-    "CSV with the header psi_deg,f_t,f_n, in place of psi, f_t and f_n",
+    "CSV with the header psi_deg,f_t,f_n, instead of psi, f_t and f_n",
     ("psi", "f_t", "f_n"),
 )
 MEDIUM = OneOf(

@@ -32,7 +32,7 @@ def parse_angle(text: str | float) -> float:
         return texts.parse_number(str(text), None)
     except ValueError:
         raise typer.BadParameter(
-            f"{text!r} is no angle: give one such as 2.5 (rad) or 120deg"
+            f"{text!r} is not an angle: write one such as 2.5 (rad) or 120deg"
         ) from None
 
 
@@ -41,7 +41,7 @@ GridOption = Annotated[
     typer.Option(
         "--grid",
         metavar="N",
-        help="points of the grid per joint, in place of the scene's",
+        help="points of the grid per joint, instead of the scene's",
     ),
 ]
 ExtentOption = Annotated[
@@ -49,7 +49,7 @@ ExtentOption = Annotated[
     typer.Option(
         "--extent",
         metavar="ANGLE",
-        help="half width of the grid in rad, or as 120deg",
+        help="half width of the grid: 2.5 (rad) or 120deg",
         parser=parse_angle,
     ),
 ]
@@ -58,7 +58,7 @@ MediumOption = Annotated[
     typer.Option(
         "--medium",
         metavar="FILE",
-        help="file of a medium or of drag, in place of the scene's",
+        help="file of a medium or of drag, instead of the scene's",
     ),
 ]
 
@@ -70,7 +70,7 @@ PluginOption = Annotated[
     typer.Option(
         "--plugin",
         metavar="FILE.py",
-        help="Python file with parts of your own, such as laws",
+        help="Python file with your own parts, such as laws",
     ),
 ]
 SUBJECTS = {"name", "subject"}  # first arguments of commands that take plug-ins
@@ -105,7 +105,7 @@ WorkersOption = Annotated[
     typer.Option(
         "--workers",
         metavar="N",
-        help="processes for long computations, one a core if left out",
+        help="processes for long computations (default one per core)",
     ),
 ]
 SchedulerOption = Annotated[
@@ -113,7 +113,7 @@ SchedulerOption = Annotated[
     typer.Option(
         "--scheduler",
         metavar="ADDRESS",
-        help="Dask cluster to compute on, as tcp://10.0.0.1:8786",
+        help="Dask cluster, such as tcp://10.0.0.1:8786",
     ),
 ]
 

@@ -193,7 +193,7 @@ def refuse_unwritable(outputs: Sequence[Output], inputs: list[Path]) -> None:
         if real[k] in real[:k]:
             raise Refusal(
                 f"cannot write {path} twice",
-                instead="give --plot, or another output, another name",
+                instead="give --plot or the other output another name",
             )
     refuse_inputs(files, inputs)
     for k, path in enumerate(files):

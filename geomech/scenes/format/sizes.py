@@ -67,7 +67,7 @@ class Sizes:
             raise Refusal(
                 f"{key} = {value!r}, but {self.places[key]} = {given!r}",
                 where=place,
-                instead="keep one",
+                instead="keep one of them",
             )
 
     def fill(self, place: str, table: dict, kind: type) -> dict:
@@ -90,6 +90,6 @@ class Sizes:
             raise Refusal(
                 key if key == "frame" else f"[physical] {key}",
                 where=self.name,
-                because="nothing in this scene has one",
-                instead="drop it, or add what has",
+                because="no part of this scene uses it",
+                instead="remove it, or add a part that uses it",
             )

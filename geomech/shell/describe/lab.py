@@ -26,7 +26,7 @@ def lab(
             metavar="[SCENE]...",
             show_default=False,
             autocompletion=scene_names,
-            help="built-in scenes or files; a gallery of six if left out",
+            help="built-in scenes or files; a gallery of six by default",
         ),
     ] = None,
     out: Annotated[
@@ -35,14 +35,14 @@ def lab(
             "-o",
             "--output",
             metavar="FILE.html",
-            help="write the page; if left out it opens in the browser",
+            help="write the page to a file instead of opening it",
         ),
     ] = None,
     over: Annotated[
         Optional[list[str]],
         typer.Option(
             metavar="KEY=VALUES",
-            help="vary this parameter of the first scene by a slider",
+            help="add a slider for this parameter of the first scene",
         ),
     ] = None,
     yes: YesOption = False,

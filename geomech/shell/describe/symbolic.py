@@ -23,7 +23,7 @@ def symbolic(
     name: SceneArgument,
     latex: Annotated[bool, typer.Option("--latex", help="print LaTeX")] = False,
     ccf: Annotated[
-        bool, typer.Option(help="print the CCF of every two joints, too")
+        bool, typer.Option(help="print the CCF of every pair of joints as well")
     ] = True,
 ) -> None:
     """Print connection and CCF in closed form. Chains in a viscous or ideal fluid,
