@@ -21,7 +21,7 @@ from geomech.results import show
 from geomech.run.backend import prefer_for
 from geomech.run.cost import Cost, decide
 from geomech.shell import terminal
-from rft.core.refusal import Refusal, in_line
+from rft.core.refusal import Refusal, in_line, spell_arguments
 
 MORE = "--all prints all variables"
 
@@ -74,7 +74,10 @@ def notes_of(result: Result) -> list[str]:
     """Return the notes of a result, which a command prints on standard error."""
     if "note" not in result:
         return []
-    return result["note"].values.tolist()
+    return [
+        spell_arguments(line, terminal.option)
+        for line in result["note"].values.tolist()
+    ]
 
 
 def printed(result: Result, as_json: bool, everything: bool) -> list[str]:

@@ -96,7 +96,7 @@ def force_unit(scene: Scene, system: Loaded, sizes: Sizes) -> ForceUnit:
 
     drag = _effect_value(scene, "drag")
     if drag is not None and length is not None:
-        source = "as the effect body-inertia has it"
+        source = "as given in the effect body-inertia"
         return ForceUnit(float(drag), length, frequency, source)
 
     missing = [name for name in ("length", "radius") if known[name] is None]
