@@ -52,7 +52,12 @@ class Chain(Links):
     modes: tuple[tuple[float, ...], ...] | str | None = None
     waves: Annotated[
         float | None,
-        Number(1e-6, 1e6, "-", "waves on the body, of serpenoid modes, 1 if left out"),
+        Number(
+            1e-6,
+            1e6,
+            "-",
+            "number of waves of serpenoid modes on the body; 1 if left out",
+        ),
     ] = None
     kind = "chain"
 

@@ -29,7 +29,7 @@ class Viscous(TermLaw):
     [0.5, 1.0]
     """
 
-    ratio: Annotated[float, Number(1e-8, 1e8, "-", "normal over axial drag")] = 2.0
+    ratio: Annotated[float, Number(1e-8, 1e8, "-", "normal drag over axial drag")] = 2.0
     covariance: tuple[tuple[float, ...], ...] | None = None
     uncertain = ("ratio",)
     law = "viscous"

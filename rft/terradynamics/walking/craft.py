@@ -43,7 +43,7 @@ class Screws(Robot):
     width: Annotated[float, metres("width of the box about the centre of mass")]
     height: Annotated[float, metres("height of the box about the centre of mass")]
     screw: Screw
-    track: Annotated[float, metres("distance from one axis to the other")]
+    track: Annotated[float, metres("distance between the axes")]
     drop: Annotated[
         float, metres("depth of the axes below the centre of mass", -LARGEST)
     ] = 0.0

@@ -15,17 +15,17 @@ from geomech.studies.measured.midlines.predicted import COMPARED, Comparison
 
 LABELS = {
     "frequency": "cycles per unit of time",
-    "body_length": "length of the body from end to end",
-    "speed": "speed: distance of the body's mean frame over time",
-    "stride": "stride: distance per cycle",
+    "body_length": "length from end to end",
+    "speed": "distance of the body's mean frame over time",
+    "stride": "distance per cycle",
     "heading": "direction of travel, counter-clockwise from x",
     "drift": "direction of travel minus the mean heading of the body",
     "turn": "turn of the body per cycle",
     "slip": "mean angle between the body and its velocity",
     "efficiency": "wave efficiency: stride over wavelength",
     "amplitude": "half the range across the direction of travel, mean over the body",
-    "wavelength": "wavelength along the direction of travel",
-    "arc_wavelength": "wavelength along the body",
+    "wavelength": "measured along the direction of travel",
+    "arc_wavelength": "measured along the body",
 }
 SOURCES = ("cycles", "noise", "smoothing")  # of errors
 
