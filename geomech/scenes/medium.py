@@ -27,7 +27,7 @@ FORCES = (Column("f_t"), Column("f_n"))  # in place of the forces on a rod
 
 @dataclass(frozen=True)
 class NamedMedium:
-    """By name, with no key beside it."""
+    """A medium of the catalogue, without other keys."""
 
     name: Annotated[
         str,
@@ -45,9 +45,10 @@ class NamedMedium:
 
 @dataclass(frozen=True)
 class MediumFile:
-    """From a file.
+    """A medium from a file.
 
-    file (-): TOML of a medium, as geomech fit-medium writes it, with no key beside it.
+    file (-): name of a TOML file with a medium, such as geomech fit-medium writes,
+    without other keys.
     """
 
     file: str

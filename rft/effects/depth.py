@@ -20,8 +20,8 @@ class DepthProfile(Effect):
     """Drag in proportion to depth, 2 k rho g r |z| of Eq. 2; depths are over the
     reference depth of the medium's drag.
 
-    along (-): |z| over that depth at equally spaced places from tail to head, linear
-    between them; [1, 1] is level.
+    along (-): |z| over the reference depth at equally spaced places from tail to head,
+    linear between them; [1, 1] is level.
 
     Each piece of the body has the depth of its centre. With a slope, drag depends on
     place and heading.

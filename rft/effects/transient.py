@@ -31,8 +31,8 @@ RATIO = 0.28  # +- 0.02
 @EFFECTS.register
 @dataclass(frozen=True)
 class Transient(Effect):
-    """Drag that comes back after a reversal: a share of it is there at once, the rest
-    over some travel.
+    """Drag that recovers after a reversal: a share of it acts at once, and the rest
+    recovers over a distance.
 
     Each element has a mean direction m, -1 to 1, of its travel x so far across the
     body, positive to the left, in which older travel counts exponentially less: dm/dx =

@@ -175,7 +175,9 @@ class Engine:
             omega[body, 2] = placement.rates
 
         self._run(n, 1, place_body)
-        require(count == n, f"LAMMPS completed {count} of {n} steps", instead="run it again")
+        require(
+            count == n, f"LAMMPS completed {count} of {n} steps", instead="run it again"
+        )
 
     def settle(
         self,

@@ -27,9 +27,9 @@ class Granular(TermLaw):
     k is part of the unit of force; only effects measured against the weight of grains
     use it (grain inertia).
 
-    covariance (-): of C and gamma0 (in rad), and of k as a third parameter if k is
-    given and has one; it changes no force and is what drag measurements leave open
-    (`rft.fits.rods`).
+    covariance (-): covariance of C and gamma0 (in rad), and of k as a third parameter
+    if k is given and uncertain. It changes no force; it is the uncertainty that drag
+    measurements leave (`rft.fits.rods`).
 
     Examples
     --------

@@ -25,8 +25,8 @@ class Surface(TermLaw):
     e51412, 2020) fitted to the drag on a plate; that of f_t, Coulomb friction, is
     assumed.
 
-    covariance (-): of C, gamma0 (in rad) and across; it changes no force and is what
-    drag measurements leave open.
+    covariance (-): covariance of C, gamma0 (in rad) and across. It changes no force; it
+    is the uncertainty that drag measurements leave.
 
     Examples
     --------

@@ -37,10 +37,12 @@ class Table:
     """Rate-independent drag (f_t, f_n) measured at attack angles psi between velocity
     and body axis, in any one unit.
 
-    psi (rad): at least three different angles that come within 15 degrees of 0 and of
-    pi/2; other angles are mapped to 0 to pi/2 by symmetry, and forces at equal angles
-    averaged (`rft.laws.drag.rod_drag`). f_t, f_n (-): as many forces per length along
-    and across, in one unit of any kind, positive against the motion.
+    psi (rad): attack angles, at least three different ones, of which one lies within 15
+    degrees of 0 and one within 15 degrees of pi/2. Other angles are mapped to 0 to pi/2
+    by symmetry, and forces at equal angles are averaged (`rft.laws.drag.rod_drag`). f_t
+    (-): force per length along the body at each angle, positive against the motion, in
+    the same unit as f_n. f_n (-): force per length across the body at each angle,
+    positive against the motion, in the same unit as f_t.
 
     With the unit velocity v, f_t is a function of v.t = cos psi and f_n a function of
     v.n = sin psi, as in Eq. 3 of Zhang and Goldman (2014). Both are odd piecewise

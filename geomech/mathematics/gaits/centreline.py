@@ -39,8 +39,8 @@ class Centreline(Gait):
     """The bends of a body of ``elements`` as measured, at amplitude 1; the amplitude
     scales them.
 
-    file (-): CSV; in a scene from a file relative to that file's folder, else to the
-    current one.
+    file (-): name of a CSV file, relative to the folder of the scene file, or to the
+    current folder if there is none.
 
     Its header line names the columns; rows may have any order:
       t,s,curvature   curvature in rad per body length at s, 0 at the tail to 1 at the
@@ -61,8 +61,8 @@ class Centreline(Gait):
     frames. Along the body they are splines as well, of order 4 in the spacing of s, 3
     in the spacing of points.
 
-    sha256 (-): of the file, filled in if left out; given, the file must have it. centre
-    (rad): takes none.
+    sha256 (-): checksum that the file must have; filled in if left out. centre (rad):
+    not allowed, because a measured centreline has no centre.
 
     The file is read once, when the gait is built.
 

@@ -84,7 +84,7 @@ class Circle(Series):
 class Ellipse(Series):
     """An ellipse, run counter-clockwise about its centre.
 
-    semi_axes (rad): at amplitude 1.
+    semi_axes (rad): semi-axes at amplitude 1.
 
     Examples
     --------

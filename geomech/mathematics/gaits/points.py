@@ -39,7 +39,7 @@ class Points(Gait):
     Phase runs with chord length. Corners become round, and between few points the curve
     bulges: a `Polygon` has straight sides.
 
-    points (rad): three rows of joint angles or more.
+    points (rad): shapes on the curve, three or more rows of joint angles.
 
     Examples
     --------

@@ -22,14 +22,14 @@ from rft.core.refusal import Refusal
 class Shchf(Gait):
     """The gait of a shchf file of sysplotter, in numbers.
 
-    XV (rad): a1, b1, a3, b3, a5, b5 ... as in its `shchf_LowRe_...` files, for the
-    closed curve u = sum of a_k cos(k t), v = - sum of b_k sin(k t), alpha_1 = (u -
-    v)/sqrt 2, alpha_2 = (u + v)/sqrt 2, in the same direction as there. file (-): a
-    .mat file of points alpha1, alpha2, ... at t, of coefficients A1, B1, A2, B2, ...,
-    or of the paths that sys_calcpath computed; in a scene from a file relative to that
-    file's folder, else to the current one. sha256 (-): of the file, filled in if left
-    out; given, the file must have it. The centre is the mean of the coefficients, if
-    left out.
+    XV (rad): coefficients a1, b1, a3, b3, a5, b5 ... as in the `shchf_LowRe_...` files,
+    for the closed curve u = sum of a_k cos(k t), v = - sum of b_k sin(k t), alpha_1 =
+    (u - v)/sqrt 2, alpha_2 = (u + v)/sqrt 2, in the same direction as there. file (-):
+    name of a .mat file of points alpha1, alpha2, ... at t, of coefficients A1, B1, A2,
+    B2, ..., or of the paths that sys_calcpath computed, relative to the folder of the
+    scene file, or to the current folder if there is none. sha256 (-): checksum that the
+    file must have; filled in if left out. centre (rad): shape angles; if left empty,
+    the mean of the coefficients.
 
     Examples
     --------

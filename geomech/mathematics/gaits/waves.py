@@ -18,8 +18,8 @@ from rft.core.refusal import Refusal
 @GAITS.register
 @dataclass(frozen=True)
 class Wave(Series):
-    """A travelling wave of joint angles, k = 1, 2 ... from the tail:
-    alpha_k = offset + amplitude cos(t + 2 pi waves k / (joints + 1)).
+    """A travelling wave of joint angles alpha_k, k = 1, 2, ... from the tail: alpha_k =
+    offset + amplitude cos(t + 2 pi waves k / (joints + 1)).
 
     It runs from head to tail, which drives the body head first where drag across
     exceeds drag along; with waves < 0, or reverse, from tail to head; with waves = 0
@@ -146,7 +146,7 @@ class Sine(Gait):
 
     With t the wave travels from head to tail. Its arc length is fixed, whatever the
     amplitude. The bends are angles between neighbouring elements, so the gait is of
-    order 2 in 1/elements. centre (rad): takes none.
+    order 2 in 1/elements. centre (rad): not allowed, because a sine wave has no centre.
 
     Examples
     --------

@@ -34,9 +34,9 @@ Scale = Annotated[
 class Gait:
     """A closed curve alpha(t) = centre + amplitude * unit(t).
 
-    Subclasses define `joints`, `unit` and `unit_rate`. centre (rad): shape angles, the
-    origin if left empty. reverse (-): run the curve backwards, t -> -t, from the same
-    start.
+    Subclasses define `joints`, `unit` and `unit_rate`. centre (rad): shape angles of
+    the centre; the origin if left empty. reverse (-): true to run the curve backwards,
+    t -> -t, from the same start.
 
     An amplitude of 0 is rest at the centre, and a negative one is the curve reflected
     through the centre, for all gaits and tiers. harmonics: the highest of the curve.

@@ -29,8 +29,8 @@ SINGULAR = 1e-14
 class NoSlipSnake:
     """Three links, tail to head, with wheels at their centres.
 
-    lengths (-): relative. frame (-): "mean", centre of mass and mean heading, or
-    "link-1", "link-2", "link-3", centre and heading of that link.
+    lengths (-): relative link lengths, tail to head. frame (-): "mean", centre of mass
+    and mean heading, or "link-1", "link-2", "link-3", centre and heading of that link.
 
     Where the wheels' axles meet in one point, or are parallel, the snake can turn about
     it without a wheel slipping sideways: the shape is singular. For equal links that is

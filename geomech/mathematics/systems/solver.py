@@ -18,10 +18,10 @@ from rft.laws.records import is_compilable
 class Solver:
     """How the balance of forces is solved; part of [numerics].
 
-    loads (-): "exact", "midpoint:N", "gauss:N" (rft.formulas.quadrature). backend (-):
-    "numpy", "numba" (compiled code, where numba is installed) or "auto": compiled code
-    where numba is installed (`rft.balance.backend`). Answers are the same but for
-    rounding.
+    loads (-): integration of the forces along a link, "exact", "midpoint:N" or
+    "gauss:N" (rft.formulas.quadrature). backend (-): "numpy", "numba" (compiled code,
+    which needs numba) or "auto", compiled code where numba is installed
+    (`rft.balance.backend`). Results agree to rounding.
 
     Examples
     --------

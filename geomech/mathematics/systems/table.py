@@ -71,12 +71,13 @@ def _chain(stored: tables.Stored) -> Chain | None:
 class Table:
     """A file of `geomech connection`, .nc or .mat, or a file of sysplotter.
 
-    file (-): in a scene from a file relative to that file's folder, else to the current
-    one. sign (-): "+" or "-" for xi = + or - A alphadot in the file; order (-):
-    "ndgrid" or "meshgrid"; if left out as the file says or shows (`tables.load`).
-    sha256 (-): of the file, filled in if left out; given, the file must have it.
-    frame (-): of xi, "mean", "link-1" ... or "minimum-perturbation", the file's own if
-    left out; another frame takes a body, from the file or the scene.
+    file (-): name of the file, relative to the folder of the scene file, or to the
+    current folder if there is none. sign (-): "+" or "-" for xi = + or - A alphadot in
+    the file. order (-): "ndgrid" or "meshgrid"; if left out, the order that the file
+    states or shows (`tables.load`). sha256 (-): checksum that the file must have;
+    filled in if left out. frame (-): frame of xi, "mean", "link-1" ... or
+    "minimum-perturbation"; if left out, the frame of the file. Another frame needs a
+    body, from the file or the scene.
 
     body: the chain of the table, in the frame of its A, where the file does not say it.
     medium: its law on that body gives the power of a change of shape, in place of a

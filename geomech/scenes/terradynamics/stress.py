@@ -59,12 +59,12 @@ _Coefficients = dataclasses.make_dataclass(
 
 @dataclass(frozen=True)
 class StressKeys(_Coefficients):
-    """Give one of name, file and all nine coefficients, or zeta alone, which is that of
-    the generic set.
+    """Give one of name, file and all nine coefficients, or zeta alone, which then
+    multiplies the generic set.
 
-    file (-): TOML with such a table, or CSV of plate drags with the header
-    beta,gamma,alpha_x,alpha_z (degrees, N/cm^3). tension (-): "keep", or "cut" for no
-    stress on faces that the map pulls on.
+    file (-): name of a TOML file with such a table, or of a CSV file of plate drags
+    with the header beta,gamma,alpha_x,alpha_z (degrees, N/cm^3). tension (-): "keep",
+    or "cut" for no stress on faces on which the map pulls.
     """
 
     zeta: Annotated[
@@ -114,11 +114,12 @@ class StressKeys(_Coefficients):
 
 @dataclass(frozen=True)
 class SpatialKeys(Spatial):
-    """Give one of name, file (either with zeta, if wanted), xi_n, and density with
+    """Give one of name or file (optionally with zeta), xi_n, and density with
     internal_friction.
 
-    file (-): TOML with a table [medium] of the vertical plane, or CSV of plate drags
-    with the header beta,gamma,alpha_x,alpha_z (degrees, N/cm^3).
+    file (-): name of a TOML file with a table [medium] of the vertical plane, or of a
+    CSV file of plate drags with the header beta,gamma,alpha_x,alpha_z (degrees,
+    N/cm^3).
     """
 
     xi_n: _optional_field(Spatial, "xi_n") = None  # type: ignore[valid-type]

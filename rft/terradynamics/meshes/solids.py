@@ -290,11 +290,10 @@ class Leg(Solid):
 class MeshFile(Solid):
     """The mesh of an STL, OBJ or PLY file (needs trimesh), in its own frame.
 
-    file (-): name of the file; in a scene file, from the scene's folder.
-    closed (-): whether the mesh must have an inside; of an open one either side may
-    lead.
-    smooth (-): whether the triangles stand for a curved surface, with edges where they
-    meet at more than 40 degrees.
+    file (-): name of the file, relative to the folder of a scene file. closed (-):
+    whether the mesh must have an inside; either side of an open mesh may lead. smooth
+    (-): whether the triangles represent a curved surface, with edges where they meet at
+    more than 40 degrees.
 
     Where more triangles are wanted than the file has, each is cut in four; the form
     stays the same.

@@ -307,8 +307,8 @@ class Wheel(Shape):
 class Polygon(Shape):
     """Straight edges between points.
 
-    points (m): (x, z) of each. closed (-): the last point is joined to the first, and
-    the body has an inside.
+    points (m): x and z of each point. closed (-): whether the last point is joined to
+    the first, so that the body has an inside.
 
     Examples
     --------
@@ -335,8 +335,8 @@ class Spline(Shape):
     """A smooth curve through points: a cubic spline whose parameter is the length of
     the chords.
 
-    points (m): (x, z) of each. closed (-): the last point is joined to the first, and
-    the body has an inside.
+    points (m): x and z of each point. closed (-): whether the last point is joined to
+    the first, so that the body has an inside.
 
     Examples
     --------

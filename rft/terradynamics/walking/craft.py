@@ -22,7 +22,8 @@ PER_SQUARE = 10  # triangles of a screw over the square of the number of element
 
 @dataclass(frozen=True)
 class Screws(Robot):
-    """Two screws under a box, which has all the mass. x forwards, y to the left, z up.
+    """Two screws under a box that carries all the mass. x forwards, y to the left, z
+    up.
 
     screw (-): the left screw; both drive forwards. pair (-): "mirrored", the right
     screw is the mirror image of the left and rotates in the other direction, or

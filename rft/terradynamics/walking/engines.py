@@ -65,8 +65,8 @@ class Walker:
 class Fineness:
     """Numerical settings of a walk.
 
-    engine (-): planar or mujoco; by default planar, but mujoco for robots and ground of
-    three dimensions.
+    engine (-): planar or mujoco; the default is planar, or mujoco for robots and ground
+    in three dimensions.
 
     Examples
     --------

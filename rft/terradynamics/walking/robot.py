@@ -206,12 +206,12 @@ class Rhex(Robot):
     """A box on two legs at each hip, which differ by half a cycle and alternate from
     hip to hip: an alternating tripod.
 
-    hips (m): x of each hip from the centre of mass.
+    hips (m): x of each hip, from the centre of mass.
 
-    aside (m): distance of the legs at each hip from the middle plane, one on either
-    side, for the engine of three dimensions. By default legs touch the box; of an odd
-    number of hips every second one has its legs farther out, so that a tripod with
-    equal forces on its legs neither rolls nor yaws the body.
+    aside (m): distance of the two legs at each hip from the middle plane, for the
+    engine of three dimensions. By default legs touch the box. With an odd number of
+    hips the legs of every second hip are farther out, so that a tripod with equal
+    forces on its legs neither rolls nor yaws the body.
 
     Examples
     --------

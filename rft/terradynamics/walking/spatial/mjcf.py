@@ -29,9 +29,9 @@ MISSING = "an MJCF needs MuJoCo: pip install 'geomech[mujoco]'"
 class Mjcf(Robot):
     """A robot of an MJCF file, walking along x, the ground at z = 0.
 
-    mjcf (-): name of the file; in a scene file, from the scene's folder. geoms (-):
-    names of the geoms that touch the ground, and nothing else. actuators (-): names of
-    the <position> or <velocity> actuators that the gait's clock drives; by default all
+    mjcf (-): name of the file, relative to the folder of a scene file. geoms (-): names
+    of the geoms that touch the ground, and of no others. actuators (-): names of the
+    <position> or <velocity> actuators that the clock of the gait drives; by default all
     of them. phases (-): phase of each of these actuators, in cycles; by default 0.
 
     Other actuators keep the controls of the first keyframe, or 0. The robot starts as
