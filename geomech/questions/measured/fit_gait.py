@@ -45,9 +45,9 @@ def write_scene(path: Path, result: Result, *, field: Path | None = None) -> Non
 @dataclass(frozen=True)
 class FitGait(Question):
     """Fit a measured gait. A log of joint angles gives the connection near its mean
-    gait, with intervals; tracked midlines give speed, heading, slip, wave efficiency,
-    amplitude and wavelength, each with an interval, and in a medium the same as
-    predicted. -o FIELD.nc -o SCENE.toml writes the connection and a scene of the mean
+    gait. Tracked midlines give speed, heading, slip, wave efficiency, amplitude and
+    wavelength, and --medium adds their prediction. All values have confidence
+    intervals. -o FIELD.nc -o SCENE.toml writes the connection and a scene of the mean
     gait."""
 
     file: Annotated[

@@ -40,11 +40,11 @@ def write_medium(path: Path, result: Result) -> None:
 
 @dataclass(frozen=True)
 class FitMedium(Question):
-    """Fit a medium to your own drag data. Rods, with the columns psi_deg, F_parallel_N,
-    F_perpendicular_N, give a force law; plates in the vertical plane, with beta, gamma,
-    alpha_x, alpha_z (degrees, N/cm^3), nine coefficients; a plate that is pushed
-    straight down, with depth_m, force_N, the factor zeta. -o FILE.toml writes the
-    medium."""
+    """Fit a medium to your own drag data. The columns of the file decide what is
+    fitted: psi_deg, F_parallel_N, F_perpendicular_N of a dragged rod give a force law;
+    beta, gamma, alpha_x, alpha_z (degrees, N/cm^3) of plates in the vertical plane give
+    nine coefficients; depth_m, force_N of a plate pushed straight down give the factor
+    zeta. -o FILE.toml writes the medium."""
 
     drag: Annotated[
         str, Subject(loading.as_typed, names.drag_names, (), "DRAG.csv", HELP)

@@ -31,9 +31,9 @@ ERRORS = ("error", "force_error", "moment_error")
 
 @dataclass(frozen=True)
 class Accuracy(Question):
-    """Measure error against time for every tier and setting. The cheapest settings that
-    meet an error are listed. The settings of an intruder scene are numbers of elements
-    or triangles; of a robot, steps, elements and rounding."""
+    """Measure error against time for every tier and setting. The result lists the
+    cheapest settings for each tolerance. The settings of an intruder scene are numbers
+    of elements or triangles; those of a robot are steps, elements and rounding."""
 
     scene: Annotated[
         "Scene | Intruding | WalkerScene",

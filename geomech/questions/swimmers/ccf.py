@@ -23,8 +23,9 @@ SIGN = "positive for counter-clockwise loops"
 
 @dataclass(frozen=True)
 class Ccf(Question):
-    """Compute the CCF and its integral over the scene's gait. --plot draws both. Of
-    three and more joints: a slice for each pair, or for one, with the others fixed."""
+    """Compute the CCF and its integral over the scene's gait. --plot draws both. A body
+    with three or more joints has a slice for each pair of joints, with the other joints
+    fixed."""
 
     scene: Annotated[
         "Scene", Subject(loading.load_scene, names.scene_names, ("grid", "extent"))

@@ -77,8 +77,9 @@ def with_contents(result: Result, ending: str, layout: str | None = None) -> Res
 
 @dataclass(frozen=True)
 class Connection(Question):
-    """Compute the local connection on a grid. A NetCDF file has the fit residual and
-    the CCF, too; a .mat file has A and the metric, in a layout of sysplotter's."""
+    """Compute the local connection on a grid. A NetCDF file also has the residual of
+    the fit and the CCF; a .mat file has A and the metric, in a layout that sysplotter
+    reads."""
 
     scene: Annotated[
         "Scene", Subject(loading.load_scene, names.scene_names, ("grid", "extent"))

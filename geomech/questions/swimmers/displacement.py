@@ -29,8 +29,8 @@ FRAME = "x ahead, y to the left, along the body frame at the start of the cycle"
 
 @dataclass(frozen=True)
 class Displacement(Question):
-    """Compute the displacement of a gait by each tier. x, y and heading after a cycle
-    from phase t = 0, each with an estimated error."""
+    """Compute the displacement of a gait by each tier. The result has x, y and heading
+    after one cycle from phase t = 0, each with an estimated error."""
 
     scene: Annotated[
         "Scene",

@@ -23,9 +23,9 @@ EQUAL = 1e-6  # relative difference up to which powers are called the same
 
 @dataclass(frozen=True)
 class Forces(Question):
-    """Compute force, power and bending moment along the body. Forces are in newtons
-    where length, radius and depth of the body are known, and else in axial drags of the
-    straight body."""
+    """Compute force, power and bending moment along the body. Forces are in newtons if
+    length, radius and depth of the body are known, otherwise in units of the axial drag
+    of the straight body."""
 
     scene: Annotated[
         "Scene", Subject(loading.load_scene, names.scene_names, ("medium",))

@@ -38,8 +38,8 @@ Data = Annotated[
 
 @dataclass(frozen=True)
 class Run(Question):
-    """Compute connection, CCF and displacements into a folder. Displacements are drawn
-    against amplitude."""
+    """Compute connection, CCF and displacements into a folder. --plot draws the
+    displacements against the amplitude."""
 
     scene: Annotated[
         "Scene",

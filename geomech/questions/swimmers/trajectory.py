@@ -28,9 +28,9 @@ def write_film(path: Path, result: Result) -> None:
 
 @dataclass(frozen=True)
 class Trajectory(Question):
-    """Follow the body through its gait. A table has pose, joint angles and ends of all
-    links at every phase. A film (-o FILE.gif) or a strip of pictures for a page
-    (--plot) shows the body on its track beside its shape on the CCF."""
+    """Follow the body through its gait. A table has the pose, the joint angles and the
+    ends of all links at every phase. A film (-o FILE.gif) or a strip of pictures
+    (--plot) shows the body on its track next to its shape on the CCF."""
 
     scene: Annotated["Scene", Subject(loading.load_scene, names.scene_names)]
     cycles: Annotated[

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Velocity(Question):
-    """Compute the body velocity of one shape and its rate. The answer has a residual
-    and a status."""
+    """Compute the body velocity of one shape and its rate. The result includes the
+    residual and the status of the force balance."""
 
     scene: Annotated["Scene", Subject(loading.load_with_gait, names.scene_names)]
     alpha: Annotated[

@@ -21,7 +21,7 @@ ROUNDING = 1e-12  # over the largest force or moment
 @dataclass(frozen=True)
 class Intrude(Question):
     """Compute force and moment of grains on a moving body. The body is an outline in
-    the vertical plane or a mesh. SI units."""
+    the vertical plane or a mesh. Results are in SI units."""
 
     scene: Annotated["Intruding", Subject(loading.load_intruder, names.intruder_names)]
 

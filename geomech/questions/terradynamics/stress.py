@@ -14,8 +14,8 @@ HELP = "name (see 'geomech scenes'), TOML or CSV of plate drags"
 
 @dataclass(frozen=True)
 class Stress(Question):
-    """Compute the stress of grains on a plate per unit depth. In N/cm^3, backwards
-    (alpha_x) and upwards (alpha_z), as in Fig. 7."""
+    """Compute the stress of grains on a plate per unit depth. The stresses are
+    backwards (alpha_x) and upwards (alpha_z), in N/cm^3, as in Fig. 7."""
 
     medium: Annotated[
         str, Subject(loading.as_typed, names.medium_names, (), "MEDIUM", HELP)

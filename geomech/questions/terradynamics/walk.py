@@ -38,8 +38,9 @@ def write_film(
 
 @dataclass(frozen=True)
 class Walk(Question):
-    """Compute how a robot walks on grains. The mean speed has an error; the motion
-    begins at rest. SI units, pitch in rad, nose down."""
+    """Compute how a robot walks on grains. The robot starts from rest, and its mean
+    speed has an estimated error. Results are in SI units; pitch is in rad, positive
+    nose down."""
 
     scene: Annotated["WalkerScene", Subject(loading.load_walker, names.walker_names)]
     engine: Annotated[

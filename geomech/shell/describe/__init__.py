@@ -4,8 +4,8 @@ One file each: ``geomech NAME`` is the function of that name in the module of th
 with the texts that it prints. A command here is a file and a line below.
 """
 
-# By the headings of `geomech --help`, as in `geomech.questions`. The lines are given
-# here, too, so that the list of commands loads none of them.
+# By the headings of `geomech --help-all`, as in `geomech.questions`. The lines are
+# given here so that the list of commands loads none of them.
 GROUPS = {
     "Analyse": {
         "symbolic": "Print connection and CCF in closed form.",

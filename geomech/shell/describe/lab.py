@@ -47,9 +47,9 @@ def lab(
     ] = None,
     yes: YesOption = False,
 ) -> None:
-    """Make a page to draw loops on the CCF and watch the swimmer. It is one file, which
-    needs no network and nothing installed: map, swimmer, and displacement of a cycle by
-    three tiers with their errors."""
+    """Write a page to draw loops on the CCF and watch the swimmer. The page is one
+    file that needs no network and no installation; it shows the map, the swimmer, and
+    the displacement per cycle by three tiers with their errors."""
     # The mechanics of scenes takes longer to load than the help of this command.
     from geomech.lab import check_format, page_path, write
     from geomech.studies.maps.lab import GALLERY, Lab
