@@ -85,7 +85,7 @@ class Registry(Mapping[str, Any]):
 
     def put(self, part: Any, name: object) -> None:
         """Add a part under a name; ValueError as `register`."""
-        who = f"the custom {getattr(part, '__name__', name)}, {self.noun},"
+        who = f"{self.noun} of your own, {getattr(part, '__name__', name)},"
         if isinstance(part, type):
             parameters = getattr(part, "__dataclass_params__", None)
             if parameters is None or not parameters.frozen:

@@ -209,7 +209,7 @@ def test_end_caps():
             "granular",
             Granular(1.8, 0.24),
             np.array([0.0, 90.0]),
-            "do not tell C, gamma0|edge of",
+            "do not distinguish C, gamma0|at the bound",
         ),
         (
             "granular",

@@ -88,7 +88,7 @@ BAD = {
     "deep": (FILE, {"M_toml": "a = " + "[" * 5000}, "is not TOML"),
     "huge": (FILE, {"M_toml": MEDIUM + "#" * 1_000_001}, "larger than 1 MB"),
     "a CSV": ('file = "T.csv"', {"T_csv": csv()}, 'add law = "table"'),
-    "a scene": (FILE, {"M_toml": MEDIUM + REST}, "must hold one table [medium] and nothing else"),
+    "a scene": (FILE, {"M_toml": MEDIUM + REST}, "must contain one table [medium] and nothing else"),
     "no medium": (FILE, {"M_toml": "x = 1"}, "names no medium"),
     "wrong key": (FILE, {"M_toml": MEDIUM.replace("C =", "c =")}, "key: 'c' is unknown"),
     "covariance": (FILE, {"M_toml": MEDIUM.replace("0.02,", "-0.02,")}, "covariance must be symmetric"),

@@ -40,7 +40,7 @@ def write_scene(path: Path, result: Result) -> None:
 
 @dataclass(frozen=True)
 class Optimize(Question):
-    """Find the best gait for an objective. The best value has an estimated error; -o
+    """Find the best gait for an objective. Its value has an estimated error; -o
     FILE.toml writes the gait as a scene, and --plot draws its loop on the CCF."""
 
     scene: Annotated["Scene", Subject(loading.load_scene, names.scene_names)]

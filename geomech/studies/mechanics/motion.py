@@ -156,7 +156,7 @@ def final_pose(motion: Motion) -> list[Variable]:
         zero = ""
         if name in reasons:
             zero = zero_reason(reasons[name])
-        label = "pose after the last cycle"
+        label = "after the last cycle"
         found.append(Variable(f"final_{name}", (), value, pose_unit, label, zero=zero))
     return found
 

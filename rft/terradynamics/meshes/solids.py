@@ -173,7 +173,7 @@ class Screw(Solid):
         require(
             self.turns <= MOST_TURNS,
             f"the thread has {self.turns:.4g} turns, more than {MOST_TURNS}",
-            because="length / pitch",
+            instead="lower length / pitch",
         )
 
     @property
