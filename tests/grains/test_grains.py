@@ -254,7 +254,7 @@ def test_what_cannot_be_is_refused(build, said):
 @pytest.mark.parametrize(
     ("folder", "said"),
     [
-        ("file", "File exists; take"),
+        ("file", "File exists; use"),
         ("für", "does not accept the folder name"),
         ('a"', "quotes"),
     ],

@@ -70,7 +70,7 @@ def test_angles_beyond_a_full_turn_are_noted_once_and_the_result_is_given(
 
 def test_a_gamma0_below_a_degree_is_noted():
     small = PLAIN.replace("gamma0_deg = 13.8", "gamma0_deg = 0.24")
-    with pytest.warns(UnitWarning, match="0.24 is less than a degree"):
+    with pytest.warns(UnitWarning, match="0.24 is less than one degree"):
         scenes.parse(small)
 
 

@@ -49,7 +49,7 @@ FORMS = {
     "UTF-16, no mark": (PLAIN.encode("utf-16-le"), "UTF-16"),
     "line of units": (PLAIN.replace("_N\n", "_N\nmm,N\n"), "line 2 contains units"),
     "units below": (PLAIN.replace("depth_mm,force_N", "Depth,Force\n[mm],[N]"), "units"),
-    "logger": (HEAD + PLAIN + "End (:", "above line 4.*line 10 at the end of the file"),
+    "logger": (HEAD + PLAIN + "End (:", "header in line 4.*line 10 at the end of the file"),
     "cut off": (PLAIN + "3.75", "line 7 at the end of the file is incomplete"),
     "other names": (PLAIN.replace("depth_mm,force_N", "Sinkage (mm),Force / N"), "Sinkage"),
     "ends": (PLAIN.replace("\n", ",\n"), ""),
