@@ -74,7 +74,7 @@ def _curve(variables: Mapping, number: int) -> Curve:
             t = np.linspace(0.0, 1.0, len(path))
             return _curve_through("p.phi_locus_full", t, path)
     if number != 1:
-        raise Refusal(f"has one gait, but no number {number}", instead="drop number")
+        raise Refusal(f"has one gait, but no number {number}", instead="remove number")
     columns = _columns(variables, "alpha")
     if columns:
         t = np.linspace(0.0, 1.0, len(columns[0]))

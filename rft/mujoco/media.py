@@ -76,7 +76,7 @@ def sample(
     rng = np.random.default_rng(seed)
     if isinstance(medium, StressFit):
         require(
-            spread is None, "a fit has its own covariance", instead="drop ``spread``"
+            spread is None, "a fit has its own covariance", instead="remove ``spread``"
         )
 
         def draw(count: int) -> np.ndarray:
@@ -85,7 +85,7 @@ def sample(
         return _draw_maps(draw, n)
 
     if isinstance(medium, ZetaFit):
-        require(spread is None, "a fit has its own error", instead="drop ``spread``")
+        require(spread is None, "a fit has its own error", instead="remove ``spread``")
         spread = medium.error / medium.zeta
         medium = StressMap(zeta=medium.zeta)
     if isinstance(medium, str) and medium in VERTICAL:

@@ -143,7 +143,7 @@ ONE_JOINT = {"A1": [0.0, 1.0], "B1": [0.0, 1.0]}
         ({"A1": [0.1], "B1": [0.0]}, {}, "has no gait"),
         ({"A1": [0.1, 1], "A2": [0.1, 1], "B1": [0.0, 5]}, {}, "has no gait"),
         ({"A2": [0.1, 1], "B2": [0.0, 5]}, {}, "has no gait"),
-        (ONE_JOINT, {"number": 2}, "has one gait, but no number 2: drop number"),
+        (ONE_JOINT, {"number": 2}, "has one gait, but no number 2: remove number"),
         (
             {"p": {"phi_def": 1.0}},
             {},

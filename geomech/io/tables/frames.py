@@ -81,13 +81,13 @@ def _pose(stored: Stored, frame: str, chain: Any) -> tuple[np.ndarray, np.ndarra
     if isinstance(c, Tube):
         raise Refusal(
             f"a table near a measured gait has only the frame {stored.frame!r}",
-            instead="drop frame",
+            instead="remove frame",
         )
     if frame == MINIMUM_PERTURBATION:
         field = minimum_perturbation(c)
         return np.moveaxis(field.field.values, 0, -1), field.grid_slopes
     if chain is None or stored.frame != chain.frame:
-        cure = f"drop frame, or use {MINIMUM_PERTURBATION!r}"
+        cure = f"remove frame, or use {MINIMUM_PERTURBATION!r}"
         if chain is None:
             cure += ", or add [system.body]in the frame of A"
         raise Refusal(

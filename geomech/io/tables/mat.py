@@ -270,7 +270,7 @@ def _axes(contents: dict, order: str) -> tuple[tuple[np.ndarray, np.ndarray], st
         if max(np.ptp(a, axis=1).max(), np.ptp(b, axis=0).max()) <= 1e-9:
             if order not in ("", name):
                 raise Refusal(
-                    f"has arrays in the order of {name}", instead="drop order"
+                    f"has arrays in the order of {name}", instead="remove order"
                 )
             return _checked_axes(contents, a[:, 0], b[0]), name
     raise Refusal(

@@ -58,7 +58,7 @@ def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
     if raw[:4] not in (b"CDF\x01", b"CDF\x02"):
         raise Refusal(_other_format(raw))
     if order not in ("", "ndgrid"):
-        raise Refusal("names its dimensions", instead="drop order")
+        raise Refusal("names its dimensions", instead="remove order")
     contents = _read(raw)
     stored = _stored(contents, sign, sha256)
     names = contents.axis_names

@@ -118,11 +118,11 @@ class Ccf(Question):
         if stretch and (self.metric or self.compare_frame or style != "map"):
             raise Refusal(
                 "``stretch`` draws a map of its own",
-                instead="drop ``style``, ``metric`` and ``compare_frame``",
+                instead="remove ``style``, ``metric`` and ``compare_frame``",
             )
         if self.metric and style != "map":
             raise Refusal(
-                "``metric`` needs a map to draw on", instead=f"drop ``style`` {style}"
+                "``metric`` needs a map to draw on", instead=f"remove ``style`` {style}"
             )
 
     def compute(self, run: Run) -> Result:
@@ -218,7 +218,7 @@ class Ccf(Question):
                 instead="request ``stretched`` for a scene with two joints",
             )
         if stretch and ax is not None:
-            raise Refusal("a stretched map fills a figure", instead="drop ``ax``")
+            raise Refusal("a stretched map fills a figure", instead="remove ``ax``")
         scene = scene_of(result)
         labels = shape_labels(scene.system)
         options = {"labels": labels, "components": component, "clim": clim}
@@ -230,7 +230,7 @@ class Ccf(Question):
                 (options["other"],) = slices_of(result, "other_ccf")
             planes = slices_of(result, "ccf")
             if ax is not None:
-                raise Refusal("slices fill a figure", instead="drop ``ax``")
+                raise Refusal("slices fill a figure", instead="remove ``ax``")
             return plots.planes_figure(
                 planes, scene.gait, style=style, names=both, **options
             )

@@ -310,7 +310,7 @@ def check_settings(scene: Any, ending: str, options: dict[str, Any]) -> None:
     if struct and ("sign" in options or "order" in options):
         raise Refusal(
             "a struct s has its own sign and order",
-            instead="drop ``sign`` and ``order``",
+            instead="remove ``sign`` and ``order``",
         )
 
 

@@ -78,7 +78,7 @@ class Displacement(Question):
 
     def check(self) -> None:
         if self.tolerance is not None and self.tiers is not None:
-            raise Refusal("``tolerance`` chooses the tier", instead="drop ``tiers``")
+            raise Refusal("``tolerance`` chooses the tier", instead="remove ``tiers``")
         if self.effort:
             from geomech.studies.estimates.effort import refuse_costless
 

@@ -172,7 +172,7 @@ class Plan:
                     raise Refusal(
                         reason,
                         where=self.scene.name,
-                        instead="drop ``metric`` and ``stretch``",
+                        instead="remove ``metric`` and ``stretch``",
                     )
             if self.other_frame is not None and len(self.pairs_and_origins) > 1:
                 raise Refusal(

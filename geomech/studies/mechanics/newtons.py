@@ -123,7 +123,7 @@ def _known_sizes(scene: Scene, sizes: Sizes) -> dict[str, float | None]:
         if given is not None and not math.isclose(given, value, rel_tol=1e-6):
             raise Refusal(
                 f"``{name}`` is {given:g}, but the scene has {value:g}",
-                instead=f"drop ``{name}``",
+                instead=f"remove ``{name}``",
             )
         known[name] = value
     return known

@@ -189,4 +189,4 @@ def check_stretch(scene: Scene) -> None:
         )
     reason = why_no_metric(scene.system)
     if reason:
-        raise Refusal(reason, where=scene.name, instead="drop ``stretch``")
+        raise Refusal(reason, where=scene.name, instead="remove ``stretch``")
