@@ -33,8 +33,8 @@ class NamedMedium:
         str,
         Word(
             MEDIA,
-            f"name of a medium in the catalogue: {', '.join(MEDIA)}; 'geomech scenes "
-            "--show NAME' prints one",
+            f"name of a medium in the catalogue: {', '.join(MEDIA)}; "
+            "'geomech scenes --show NAME' prints one",
         ),
     ]
 

@@ -240,7 +240,7 @@ def test_no_medium_of_ours_is_suspected(name):
             "Expected `float`, got `str` - at `.C`: give a number instead of 'big'",
         ),
         ('"chain"', '"chain"\nlengths = [1, "1", 1]', "give a number instead of '1'"),
-        ('"chain"', '"chain"\nlengths = 3', "give a list in [ ] in place of 3"),
+        ('"chain"', '"chain"\nlengths = 3', "give a list in [ ] instead of 3"),
         ('"circle"', '"circle"\nreverse = 1', "give true or false in place of 1"),
         (
             '"circle"',

@@ -115,12 +115,12 @@ def test_cells_that_only_python_takes_for_numbers_are_refused(cell, tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("depth_mm\tforce_N\n1,234\t5,678\n2,345\t6,789\n", "line 2: '1,234' may have a decimal comma, or thousands separators"),
-        ('depth_mm,force_N\n"1,234","5,678"\n2,3\n', "line 2: '1,234' may have a decimal comma, or thousands separators"),
+        ("depth_mm\tforce_N\n1,234\t5,678\n2,345\t6,789\n", "line 2: '1,234' may have a decimal comma or thousands separators"),
+        ('depth_mm,force_N\n"1,234","5,678"\n2,3\n', "line 2: '1,234' may have a decimal comma or thousands separators"),
         ("depth_mm;force_N\n0,5;1.5\n1,5;2,5\n", "line 2: a row must be 2 finite numbers"),
         ("depth_mm,force_N\nm,N\n1,2\n2,3\n", "line 2: depth_mm is in m here: keep one"),
-        ("1,2\n2,3\n", "line 1: it has no header: its first line has 2 numbers"),
-        ("t,force_N\n1,2\n", "no column depth: it has 't, force_N'; it must have depth_m,force_N"),
+        ("1,2\n2,3\n", "line 1: the file has no header: its first line has 2 numbers"),
+        ("t,force_N\n1,2\n", "no column depth: the columns are 't, force_N'; it must have depth_m,force_N"),
         ("depth (N),force_N\n1,2\n", "line 1: column depth .N. is in 'N': give it in m or cm"),
         ("depth_mm,force_N\n1,2\n2\n3,4\n", "line 3: a row must be 2"),
         ("Operator,5\ndepth_mm,force_N\n1,x\n2,3\n3,4\n", "line 3: a row must be 2"),

@@ -107,7 +107,7 @@ def test_no_input_is_written_over(command, link, name, tmp_path):
     link(tmp_path / name, tmp_path / out)
     code, _, err = geomech(*command.split(), cwd=tmp_path)
     assert code == 2
-    assert f"cannot write {out}: it is an input" in err
+    assert f"cannot write {out}: it is one of the inputs" in err
     assert (tmp_path / name).read_text() == text
 
 

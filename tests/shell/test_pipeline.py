@@ -94,7 +94,7 @@ def test_too_much_takes_yes_beforehand_and_on_the_way(seconds, last, asked):
     ("names", "said"),
     [
         (["no/out.csv"], "cannot write no/out.csv"),
-        (["s.toml"], "it is an input"),
+        (["s.toml"], "it is one of the inputs"),
         (["out.csv", "out.csv"], "twice"),
         (["out.csv", "link.csv"], "twice"),
     ],

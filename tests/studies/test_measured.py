@@ -566,15 +566,15 @@ def test_lengths_and_signs_of_a_field(usual, field):
     [
         (lambda d: d.drop_vars("gait_slope"), "no gait_slope that fits it"),
         (lambda d: d.assign(gait_beyond=d.gait_beyond.expand_dims("more")), "no gait_beyond that fits it"),
-        (lambda d: d.assign(gait_spread=d.gait_spread * (2 * d.joint - 3)), "parts do not fit"),
-        (lambda d: d.isel(normal=[0, 0]), "parts do not fit"),
-        (lambda d: d.isel({d.gait_A.dims[-1]: slice(1, None)}), "parts do not fit"),
-        (lambda d: d.isel(along_and_across=[0, 1, 1]), "parts do not fit"),
-        (lambda d: d.assign_attrs(level=1.0), "parts do not fit"),
-        (lambda d: d.assign_attrs(level=b"most"), "parts do not fit"),
-        (lambda d: d.assign_attrs(error_factor=0.0), "parts do not fit"),
-        (lambda d: d.assign_attrs(error_factor=1e6), "parts do not fit"),
-        (lambda d: d.assign_attrs(error_factor=[2.0, 2.0]), "parts do not fit"),
+        (lambda d: d.assign(gait_spread=d.gait_spread * (2 * d.joint - 3)), "parts do not match"),
+        (lambda d: d.isel(normal=[0, 0]), "parts do not match"),
+        (lambda d: d.isel({d.gait_A.dims[-1]: slice(1, None)}), "parts do not match"),
+        (lambda d: d.isel(along_and_across=[0, 1, 1]), "parts do not match"),
+        (lambda d: d.assign_attrs(level=1.0), "parts do not match"),
+        (lambda d: d.assign_attrs(level=b"most"), "parts do not match"),
+        (lambda d: d.assign_attrs(error_factor=0.0), "parts do not match"),
+        (lambda d: d.assign_attrs(error_factor=1e6), "parts do not match"),
+        (lambda d: d.assign_attrs(error_factor=[2.0, 2.0]), "parts do not match"),
         (lambda d: d.assign(gait=0 * d.gait), "a gait that does not move"),
     ],
 )  # fmt: skip
@@ -626,7 +626,7 @@ def late(rows):
     [
         (lambda r: np.delete(r, slice(100, 120), 0), "line 101: no rows for 0.7 after this one .*, its only gap: cut"),
         (lambda r: np.delete(r, [*range(100, 120), *range(220, 230)], 0), "line 101: .*, the longest of 2 gaps: cut"),
-        (lambda r: r[: 9 * 30 + 15], "7 whole cycles, .*, are too few: give at least 10 in all"),
+        (lambda r: r[: 9 * 30 + 15], "7 full cycles, .*, are too few: give at least 10 in all"),
         (lambda r: r[[*range(100), 101, 100, *range(102, 300)]], "line 103: t = .* comes after .*: sort the rows by time"),
         (changed(0, lambda r: r[0, 0], slice(99, 101)), "line 102: t = .* is given twice: keep one"),
         (changed(5, lambda r: np.degrees(r[:, 5]) % 360), "line 3: heading jumps by 359.3, a full turn in degrees: add degrees"),
@@ -866,7 +866,7 @@ def smooth_of(values, noise=0.0, knots=4.0):
 @pytest.mark.parametrize(
     ("speed", "turn", "period", "length", "facts", "said"),
     [
-        (0.98, 1.96, 299.0, 1.0, {}, ()), (1.02, 0.0, 1.0, 1.0, {}, ("x and y move by 2.04 body lengths where",)),
+        (0.98, 1.96, 299.0, 1.0, {}, ()), (1.02, 0.0, 1.0, 1.0, {}, ("x and y move by 2.04 body lengths while",)),
         (0.5, 2.02, 1.0, 1.0, {}, ("the heading turns 4.04 times as fast as the joints",)),
         (2.9, 0.0, 1.0, 3.0, {"metres": True}, ()), (0.5, 0.0, 301.0, 1.0, {"seconds": False}, ()),
         (3.1, 0.0, 301.0, 3.0, {}, ("x and y move by 2.07", "the joints repeat every 301, and t is")),

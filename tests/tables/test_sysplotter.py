@@ -92,7 +92,7 @@ def test_a_struct_of_three_joints_is_read(tmp_path):
     ("change", "said"),
     [
         (lambda A: A, None),
-        (lambda A: -A, "of the other sign"),
+        (lambda A: -A, "with the opposite sign"),
         (lambda A: A[:, ::-1].swapaxes(-1, -2), "with alpha1 and alpha2 swapped"),
         (lambda A: A[..., ::-1, ::-1], "with both axes reversed"),
         (
@@ -108,7 +108,9 @@ def test_a_connection_that_its_body_would_have_with_other_axes_is_noted(
     content = {"A_num": cell(-A, (3, 2)), "Avec": cell(A, (3, 2))}
     table = Table(write(tmp_path / "s.mat", vecfield={"eval": {"content": content}}))
     np.testing.assert_array_equal(table.stored.connection.A, A)
-    noted = f"its A resembles that of a body of links {said} (correlation 1.00, as it stands "
+    noted = (
+        f"its A resembles that of a body of links {said} (correlation 1.00; as read "
+    )
     assert [x.startswith(noted) for x in table.assumed] == [True] * bool(said)
 
 
@@ -295,7 +297,7 @@ def spoilt(value):
         (
             ("grid", "eval", (1, 0)),
             np.ones((4, 5)),
-            "has s.grid.eval of shapes (5, 4),",
+            "has s.grid.eval of different shapes, (5, 4),",
         ),
         (
             (*CONTENT, "Avec"),

@@ -176,7 +176,7 @@ def test_parts_that_a_netcdf_file_lacks_are_none(tmp_path):
                 less("A_error"),
                 cut("A", np.s_[:, :1]),
             ),
-            "has A of shape (3, 1, 5, 4) ; it must be (3, 2, ...), with the rows x, y, t",
+            "has A of shape (3, 1, 5, 4); it must be (3, 2, ...), with the rows x, y, t",
         ),
         (
             part("component", ("component",), ["theta", "y", "x"]),
@@ -194,7 +194,7 @@ def test_parts_that_a_netcdf_file_lacks_are_none(tmp_path):
         (attributes(body_length=[0.3, 0.3]), "has a body_length"),
         (attributes(body_length="1"), "has a body_length"),
         (attributes(interpolation=4), "has too few shapes for a spline of degree 4: w"),
-        (cut("harmonics", np.s_[:, :3]), "has harmonics of shape (3, 3, 5, 4) ; i"),
+        (cut("harmonics", np.s_[:, :3]), "has harmonics of shape (3, 3, 5, 4); i"),
         (put("harmonics", (1, 2, 3, 0), np.nan), "has harmonics that is not finite"),
         (put("even_part", (1, 2, 3), np.nan), "has even_part that is not finite"),
         (
@@ -212,7 +212,7 @@ def test_parts_that_a_netcdf_file_lacks_are_none(tmp_path):
         ),
         (
             both(less("pair_joints"), cut("ccf_pairs", np.s_[[0, 0]])),
-            "has ccf_pairs of shape (2, 3, 5, 4) ; it must be (1, 3, ...)",
+            "has ccf_pairs of shape (2, 3, 5, 4); it must be (1, 3, ...)",
         ),
         (put("ccf_pairs", (0, 2, 1, 1), np.nan), "has ccf_pairs that is not finite"),
         (attributes(power_degree=100.0), "has a power_degree that is not valid"),
@@ -220,7 +220,7 @@ def test_parts_that_a_netcdf_file_lacks_are_none(tmp_path):
         (attributes(power_degree=[1.0, 2.0]), "has a power_degree"),
         (
             cut("norm", np.s_[:4]),
-            "has a norm of shape (4, 5, 4) ; it must be (an odd number, ...) of",
+            "has a norm of shape (4, 5, 4); it must be (an odd number, ...) of",
         ),
         (
             part(
@@ -228,7 +228,7 @@ def test_parts_that_a_netcdf_file_lacks_are_none(tmp_path):
                 ("joint", "other_joint", *GRID),
                 np.reshape([[1, 0.5], [0.6, 1]], (2, 2, 1, 1)) * np.ones((5, 4)),
             ),
-            "has a metric of shape (2, 2, 5, 4) ; it must be (2, 2, ...) and symm",
+            "has a metric of shape (2, 2, 5, 4); it must be (2, 2, ...) and symm",
         ),
         (
             masked("A", "fit_residual", "speed", "A_error"),

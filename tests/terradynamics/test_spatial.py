@@ -233,7 +233,7 @@ REFUSED = [
         "open: 3 edges have only one triangle; close it, for",
     ),
     (lambda: Mesh(CUBE, SIDES[:, ::-1]), "inside out: its normals point inwards"),
-    (lambda: Mesh(CUBE, TURNED), "run along the same way"),
+    (lambda: Mesh(CUBE, TURNED), "run along an edge of the mesh in the same direction"),
     (lambda: Mesh(CUBE, DOUBLED), "doubles"),
     (lambda: Mesh(WITHIN, HOLLOW), "lies inside"),
     (lambda: Mesh(CUBE, LINE), "no area"),

@@ -418,7 +418,7 @@ REFUSED = [
     (lambda: Polygon([(0, 0), (1, 0), (0.5, 0)], 0.1, closed=False), "turns back onto"),
     (lambda: Rotate(0.02, rate=0.0), "rate must not be 0"),
     (lambda: Path([0, 2, 1], [0, 1, 2], [0, 1, 2]), "t must increase, but t = 2"),
-    (lambda: Path([0, 1, 2], [0, 1], [0, 1, 2]), "equally many"),
+    (lambda: Path([0, 1, 2], [0, 1], [0, 1, 2]), "the same length"),
     (lambda: loads(M0, FLAT, (0, 0), (1, 0, 0)), r"pose must have shape \(..., 3\)"),
     (lambda: loads(M0, FLAT, (0, 0, 0), (1, np.nan, 0)), "twist must be finite"),
 ]

@@ -356,7 +356,7 @@ def _harmonics(
     has_pairs = rows.size > 0 and rows.shape[1] % 2 == 0
     if rows.shape[0] != 3 or residual.shape[0] != 3 or not has_pairs:
         raise Refusal(
-            f"has harmonics of shape {rows.shape} ; it must be (3, an even number, ...)"
+            f"has harmonics of shape {rows.shape}; it must be (3, an even number, ...)"
         )
     return Harmonics(
         contents.axes,
@@ -450,7 +450,7 @@ def _quadratic_metric(contents: _Contents, degree: int) -> Metric:
         M, M.swapaxes(0, 1), rtol=0, atol=rounding
     ):
         raise Refusal(
-            f"has a metric of shape {M.shape} ; it must be ({joints}, {joints}, ...) "
+            f"has a metric of shape {M.shape}; it must be ({joints}, {joints}, ...) "
             "and symmetric"
         )
     return Metric(contents.axes, M, degree)
@@ -461,7 +461,7 @@ def _norm(contents: _Contents, degree: int) -> Finsler:
     rows = checked_numbers("norm", contents.field("norm", "norm_coefficient"))
     if contents.joints != 2 or len(rows) % 2 == 0:
         raise Refusal(
-            f"has a norm of shape {rows.shape} ; it must be (an odd number, ...) of "
+            f"has a norm of shape {rows.shape}; it must be (an odd number, ...) of "
             "two joints"
         )
     residual = 0 * rows[0]
@@ -486,7 +486,7 @@ def _check_pairs(contents: _Contents, masked: np.ndarray) -> None:
         values = contents.field(name, "pair", "component")
         if values.shape[:2] != (len(pairs), 3):
             raise Refusal(
-                f"has {name} of shape {values.shape} ; it must be ({len(pairs)}, 3, "
+                f"has {name} of shape {values.shape}; it must be ({len(pairs)}, 3, "
                 "...)",
                 instead=SOURCE,
             )
