@@ -293,7 +293,7 @@ WCON = {"units": {"t": "s", "x": "mm", "y": "mm"}, "data": [{"id": "1", "t": [0.
         (
             "sysf_three_link.m",
             b"function out = sysf()",
-            "a program of MATLAB.*drag_ratio",
+            "a MATLAB program.*drag_ratio",
         ),
     ],
 )

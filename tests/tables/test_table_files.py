@@ -163,7 +163,10 @@ def test_parts_that_a_netcdf_file_lacks_are_none(tmp_path):
             "has A over the dimensions (component, jo",
         ),
         (part("joint", ("k",), np.arange(3)), "holds no connection, alpha_3 is miss"),
-        (part("alpha_2", ("alpha_2",), AXES[1], units="rads"), "has alpha_2 in 'rads'"),
+        (
+            part("alpha_2", ("alpha_2",), AXES[1], units="rads"),
+            "has alpha_2 in the unit 'rads'",
+        ),
         (part("alpha_1", ("alpha_1",), 20 * AXES[0][::-1]), "has no grid: alpha_1 mu"),
         (part("alpha_1", ("alpha_1",), 57 * AXES[0]), "has alpha_1 up to 57 where an"),
         (
@@ -329,7 +332,7 @@ EVEN = {
         (
             {"gait_A": np.ones((3, 2))},
             {},
-            "has a gait, but no gait_A that fits it: wri",
+            "has a gait, but no gait_A that matches it: wri",
         ),
         ({"gait_spread": None}, {}, "has a gait, but no gait_spread"),
         (

@@ -267,7 +267,7 @@ def _check_complete(contents: _Contents) -> None:
     """Raise Refusal for a file without a variable that each connection has."""
     for name in ("joint", *contents.axis_names, "A", "fit_residual"):
         if name not in contents:
-            raise Refusal(f"holds no connection: {name} is missing", instead=SOURCE)
+            raise Refusal(f"holds no connection, {name} is missing", instead=SOURCE)
 
 
 def _checked_entries(contents: _Contents) -> tuple[np.ndarray, np.ndarray]:
