@@ -87,7 +87,7 @@ def test_a_gamma0_below_a_degree_is_noted():
     ],
 )
 def test_from_python_units_are_warned_of_by_name(ask):
-    with pytest.warns(UnitWarning, match="a joint angle of .* rad is beyond a full"):
+    with pytest.warns(UnitWarning, match="a joint angle of .* rad is more than a full"):
         ask()
 
 
