@@ -158,7 +158,7 @@ def refuse_unknown(question: Any, given: dict[str, Any]) -> None:
     for name in given:
         if name in names:
             continue
-        instead = f"use one of {', '.join(names)}"
+        instead = f"its options are {', '.join(names)}"
         nearest = difflib.get_close_matches(name, names, 1)
         if nearest:
             instead = f"did you mean {nearest[0]!r}?"
@@ -218,7 +218,7 @@ class Study:
             raise Refusal(
                 "this scene has no shape space",
                 where=self.scene.name,
-                instead="give one of a body that swims, with a [gait]",
+                instead="give a scene whose body swims, with a [gait]",
             )
         return self._tables
 

@@ -79,11 +79,11 @@ def report_cache() -> None:
 
     path = kernel(type(record(LAW)))._cache.path
     if path.exists():
-        print(f"compiled code is kept in {path.parent}")
+        print(f"compiled code is stored in {path.parent}")
     else:
         print(
-            "compiled code is not kept: set NUMBA_CACHE_DIR to a folder that has room "
-            "for it"
+            "compiled code is not stored: set NUMBA_CACHE_DIR to a folder with enough "
+            "space"
         )
 
 

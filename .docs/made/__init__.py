@@ -44,7 +44,7 @@ MADE = {
     "api": api.index,
     "commands": command_line.page,
     "figures": figures.page,
-    "keys": keys.page,
+    "keys": keys.index,
     "lab": lab.frame,
     "notebooks": notebooks,
     "thumbnails": examples.thumbnails,
@@ -78,6 +78,7 @@ def compute(app) -> None:
     generated = Path(app.srcdir) / "generated"
     generated.mkdir(exist_ok=True)
     api.write(generated / "api")
+    keys.write(generated / "keys")
     for wrong in api.wrong_examples():
         logging.getLogger(__name__).warning(wrong)
     examples.compute_all()

@@ -9,7 +9,7 @@ from geomech.shell import cli
 
 
 def page() -> str:
-    """Return a heading for each group of `geomech --help`, and for each command its
+    """Return a heading for each group of `geomech --help-all`, and for each command its
     usage, text and options."""
     commands = cli.Commands()
     parts = []

@@ -57,7 +57,7 @@ def choose_part(registry: Registry, where: str, word: object) -> str:
         name = choose(where, word, [*registry, *packages])
     except Refusal as error:
         if isinstance(word, str):
-            error.instead += " (or add one of your own by ``geomech.register``)"
+            error.instead += " (or register your own with ``geomech.register``)"
         raise
     _load(registry, where, name, packages[name])
     return name
@@ -69,7 +69,9 @@ def _load(registry: Registry, where: str, name: str, entries: list[EntryPoint]) 
     packages = " and ".join(map(_package, entries))
     if len(entries) > 1:
         raise Refusal(
-            f"{name!r} is offered by {packages}", where=where, instead="uninstall one"
+            f"{name!r} is offered by {packages}",
+            where=where,
+            instead=("uninstall one of them"),
         )
     try:
         part = entries[0].load()
@@ -85,7 +87,7 @@ def _load(registry: Registry, where: str, name: str, entries: list[EntryPoint]) 
         if getattr(part, registry.key, name) != name:
             raise Refusal(
                 f"its {registry.key} is {getattr(part, registry.key)!r}",
-                instead="give both one name",
+                instead="give both the same name",
             )
         registry.put(part, name)
 

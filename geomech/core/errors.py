@@ -26,9 +26,10 @@ def check_angle(name: str, largest: float) -> None:
     """Warn (`UnitWarning`) if an angle in rad is beyond a full turn."""
     if largest > FULL_TURN:
         warnings.warn(
-            f"{name} of {largest:.4g} rad is beyond a full turn, 2 pi: if that is in"
-            f" degrees, give {largest:.4g}deg on the command line, a key that ends in"
-            f" _deg in a scene, or {math.radians(largest):.4g} rad",
+            f"{name} of {largest:.4g} rad is more than a full turn, 2 pi: if the "
+            f"value is in degrees, write {largest:.4g}deg on the command line, use a "
+            "key that ends in _deg in a scene, or convert it to "
+            f"{math.radians(largest):.4g} rad",
             UnitWarning,
             stacklevel=3,
         )

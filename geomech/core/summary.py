@@ -84,12 +84,12 @@ def fit_residual(residual, speed) -> str:
     """Return the residual of a fit by component, rms over all shapes, over the rms of
     xi."""
     if np.isnan(residual).all():
-        return "fit residual unknown"
+        return "residual of the fit unknown"
     parts = []
     for name, r, s in zip(COMPONENTS, residual, speed):
         relative = np.sqrt(np.nanmean(r**2) / max(np.nanmean(s**2), 1e-300))
         parts.append(f"{name} {percent(relative)}")
-    return f"fit leaves {', '.join(parts)} of the rms of xi"
+    return f"the fit leaves {', '.join(parts)} of the rms of xi unexplained"
 
 
 def percent(share: float) -> str:
@@ -106,7 +106,7 @@ def lengths(unit: str, length: float | None) -> str:
         return ""
     if unit == "BL":
         return f"; lengths in {unit}"
-    return f"; lengths in {unit}, the body's {length:g}"
+    return f"; lengths in {unit}, body length {length:g}"
 
 
 def poses(values) -> str:
@@ -152,11 +152,11 @@ def effect_lines(effects: Sequence) -> list[str]:
     """Return a line for each effect on the ground, and one more for its assumptions."""
     lines = []
     for effect in effects:
-        premises = negation(effect.breaks) or "keeps every premise"
+        premises = negation(effect.breaks) or "breaks no assumption"
         lines.append(
-            f"on:  {part(effect.kind, effect)}; {premises}; costs {effect.cost};"
-            f" gone at {effect.limit}, order {effect.order}"
+            f"on:  {part(effect.kind, effect)}; {premises}; cost: {effect.cost}; "
+            f"vanishes as {effect.limit} (order {effect.order})"
         )
         if effect.assumes:
-            lines.append(f"     assumes {effect.assumes}")
+            lines.append(f"     assumption: {effect.assumes}")
     return lines

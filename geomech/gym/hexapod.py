@@ -23,8 +23,8 @@ FALL = 2.0  # reward lost by turning over
 NOISE = 0.3  # rad, of the angles at the start
 SIZE = 28  # of an observation
 PARTS = "forward", "effort", "fall"
-NO_ACTION = "the action is no number"
-NO_MOTION = "the motion is no number: MuJoCo began anew"
+NO_ACTION = "the action must be finite numbers"
+NO_MOTION = "the motion is not finite: MuJoCo has reset the simulation"
 
 
 def _sand(medium: Any) -> tuple[mujoco.MjModel, Sand]:
@@ -38,7 +38,7 @@ def _sand(medium: Any) -> tuple[mujoco.MjModel, Sand]:
 
 def _require_open(sand: Sand) -> None:
     """Raise Refusal for an environment that is closed."""
-    require(sand.is_attached, "the environment is closed", instead="make it anew")
+    require(sand.is_attached, "the environment is closed", instead="create a new one")
 
 
 def _is_sound(passed, seconds: float, qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:

@@ -40,7 +40,7 @@ def read(path: str | Path, largest: int, pipes: bool = False) -> bytes:
     path.stat()  # OSError where there is nothing of that name
     is_pipe = path.is_fifo()
     if not path.is_file() and not (pipes and is_pipe):
-        raise OSError(errno.EINVAL, "it is no ordinary file")
+        raise OSError(errno.EINVAL, "it is not an ordinary file")
     too_large = OSError(errno.EFBIG, f"it is larger than {largest / 1e6:g} MB")
     with open(path, "rb", opener=_open_pipe if is_pipe else None) as file:
         if os.fstat(file.fileno()).st_size > largest:
@@ -49,7 +49,7 @@ def read(path: str | Path, largest: int, pipes: bool = False) -> bytes:
         if len(raw) > largest:
             raise too_large
         if not raw and is_pipe:
-            raise OSError(errno.EPIPE, "nothing came through this pipe")
+            raise OSError(errno.EPIPE, "the pipe delivered no data")
     return raw
 
 
@@ -97,7 +97,7 @@ def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
                 if os.path.samefile(output, source):
                     raise Refusal(
                         f"cannot write {output}",
-                        because=f"it is an input, {source}",
+                        because=f"it is one of the inputs, {source}",
                         instead="choose another output",
                     )
 
@@ -117,7 +117,7 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
     try:
         target = Path(path).resolve()
         if target.exists() and not target.is_file():
-            raise OSError("it is no ordinary file")
+            raise OSError("it is not an ordinary file")
         # Within a staging folder the user knows the name alone.
         displayed = target.name if target.parent.name == NEW else path
     except (OSError, RuntimeError, ValueError) as error:
@@ -147,7 +147,7 @@ def atomic_folder(path: str | Path, inputs: Iterable[Path] = ()) -> Iterator[Pat
         return Refusal(
             f"cannot write the folder {path}",
             because=reason_of(error),
-            instead="choose another with -o",
+            instead="choose another folder with -o",
         )
 
     try:
@@ -172,8 +172,8 @@ def _move(files: list[Path], target: Path, path: Path, inputs: Iterable[Path]) -
         if not (target / name).is_file():
             raise Refusal(
                 f"cannot write {path / name}",
-                because="it is no ordinary file",
-                instead="choose another with -o",
+                because="it is not an ordinary file",
+                instead="choose another folder with -o",
             )
     refuse_inputs([path / name for name in replaced], inputs)
     target.mkdir(parents=True, exist_ok=True)
@@ -191,7 +191,7 @@ def _write_error(what: object, error: OSError) -> Exception:
     return Refusal(
         f"cannot write {what}",
         because=error.strerror,
-        instead="make room, or choose another output",
+        instead="free some disk space, or choose another output",
     )
 
 

@@ -9,33 +9,34 @@ from pathlib import Path
 from rft.core.refusal import Refusal
 
 TRACKS = (
-    "SLEAP writes CSV by File > Export Analysis CSV, DeepLabCut by "
-    "deeplabcut.analyze_videos_converth5_to_csv(folder); else write rows t,point,x,y"
+    "export CSV from SLEAP by File > Export Analysis CSV, or from DeepLabCut by "
+    "deeplabcut.analyze_videos_converth5_to_csv(folder); otherwise write rows "
+    "t,point,x,y"
 )
 SPREADSHEET = "save the sheet as CSV"
-BAG = "export its topic as CSV, for example by rostopic echo -p"
-MATLAB = "write its columns as CSV by writematrix or writetable"
-NUMPY = "write it by numpy.savetxt, with header and comments=''"
-TEXT = "write its columns as CSV, for example by pandas.DataFrame.to_csv"
+BAG = "export its topic as CSV, for example with rostopic echo -p"
+MATLAB = "write its columns as CSV with writematrix or writetable"
+NUMPY = "write it with numpy.savetxt, with a header and comments=''"
+TEXT = "write its columns as CSV, for example with pandas.DataFrame.to_csv"
 SIGNATURES = (  # the first bytes of a file, what it is, and the cure
     (b"\x89HDF\r\n\x1a\n", "an HDF5 file", TRACKS),
-    (b"PK\x03\x04", "a spreadsheet, or another zip file", SPREADSHEET),
+    (b"PK\x03\x04", "a spreadsheet or another zip file", SPREADSHEET),
     (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an Excel workbook", SPREADSHEET),
     (b"MATLAB 5.0 MAT-file", "a MATLAB file", MATLAB),
     (b"#ROSBAG", "a ROS bag", BAG),
     (b"\x89MCAP", "a ROS bag (MCAP)", BAG),
-    (b"SQLite format 3\x00", "a database, as of ROS 2 bags", BAG),
+    (b"SQLite format 3\x00", "a database, such as a ROS 2 bag", BAG),
     (b"\x93NUMPY", "a NumPy array", NUMPY),
     (b"PAR1", "a Parquet file", TEXT),
     (b"\x1f\x8b", "a gzip file", "unpack it"),
 )  # fmt: skip
 PROGRAMS = {  # of MATLAB files of sysplotter, by the start of their names
-    "sysf": "run sys_calcsystem on it and give the _calc.mat that this saves, or write "
-    "a scene with its s.geometry (linklengths, baseframe, length) and "
+    "sysf": "run sys_calcsystem on it and give the _calc.mat file that this saves, or "
+    "write a scene with its s.geometry (linklengths, baseframe, length) and "
     "s.physics.drag_ratio",
     "shchf": 'give its XV to [gait] kind = "shchf", or save alpha1, alpha2, ... and t '
     "of its gait in a .mat file",
-    "": "run it in MATLAB, and give the .mat file or the table that it saves",
+    "": "run it in MATLAB and give the .mat file or the table that it saves",
 }
 
 
@@ -47,7 +48,7 @@ def refuse_program(path: str | Path) -> None:
         return
     start = next(x for x in PROGRAMS if path.name.lower().startswith(x))
     raise Refusal(
-        f"{path.name} is a program of MATLAB, not its result",
+        f"{path.name} is a MATLAB program, not its result",
         instead=PROGRAMS[start],
     )
 
@@ -75,8 +76,8 @@ def _kind_and_cure(path: str | Path, raw: bytes) -> tuple[str, str]:
     if isinstance(content, dict) and {"units", "data"} <= {*content}:
         return (
             "a WCON file (JSON)",
-            "write a row t,point,x,y for each point of t, x, y in its data",
+            "write one row t,point,x,y for each point in its data",
         )
     if Path(path).suffix.lower() == ".wcon":
         return "a WCON file (JSON)", "write its points as rows t,point,x,y"
-    return "JSON", "write its values as a CSV file, a row for each time"
+    return "JSON", "write its values as a CSV file with one row for each time"

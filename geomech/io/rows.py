@@ -101,7 +101,7 @@ class Column(NamedTuple):
         else ""."""
         if unit or not self.unit or split_unit(self.name)[1] != self.unit:
             return ""
-        return f"{word} is taken to be in {self.unit}"
+        return f"{word} is assumed to be in {self.unit}"
 
     def factor(self, word: str, unit: str) -> float:
         """Return the factor from a unit of the file to the column's own; Refusal for a
@@ -111,11 +111,11 @@ class Column(NamedTuple):
             return 1.0
         if unit == "MN" and word.isupper():
             raise Refusal(
-                f"column {word} may be in mN or in MN",
-                instead="write the unit as it is",
+                f"the unit of column {word} may be mN or MN",
+                instead="write the unit with its capital letters",
             )
         if unit not in units:
-            cure = "it has no unit here"
+            cure = "leave the unit out, this column has none"
             if units:
                 cure = f"give it in {' or '.join([*units][:4])}"
             raise Refusal(f"column {word} is in {formatted(unit, 30)}", instead=cure)
@@ -216,7 +216,7 @@ class Rows:
         numbers: it may be any file, whose first line no message should show."""
         if all(self.number(x) is None for x in self.first_cells()):
             return ""
-        return f"it has {formatted(', '.join(self.words), 200)}"
+        return f"the columns are {formatted(', '.join(self.words), 200)}"
 
     def first_cells(self) -> list[str]:
         """Return the cells of the first row; none without a row."""
@@ -323,13 +323,16 @@ class Rows:
         first = self.number(cells[0]) if cells else 0.0
         epoch_unit = _unit_since_1970(first, unit)
         if epoch_unit:
-            note = f"{word} is in {epoch_unit} since 1970, counted from the first row"
+            note = (
+                f"{word} is in {epoch_unit} since 1970 and is counted from the first "
+                "row"
+            )
             return self._since_first(cells) * UNITS["time"][epoch_unit], note
         if first > LARGEST_NUMBER and not unit:
             raise Refusal(
-                f"{word} is {first:g}, in no unit that is known",
+                f"{word} is {first:g}, and its unit cannot be recognised",
                 where=f"{self.name}, line {self.lines[0]}",
-                instead=f"name it, for example {word}_ns",
+                instead=f"name the unit, for example {word}_ns",
             )
         values = np.array([self.number(cell) for cell in cells], float)
         return values * UNITS["time"].get(unit, 1.0), ""
@@ -342,7 +345,7 @@ class Rows:
             cell = row[index] if index < len(row) else ""
             if self.number(cell) is None:
                 raise Refusal(
-                    f"{formatted(cell, 30)} is no time",
+                    f"{formatted(cell, 30)} is not a time",
                     where=f"{self.name}, line {line}, column {self.words[index]}",
                     instead="give the time in s as a number",
                 )
@@ -393,7 +396,7 @@ class Rows:
                 f"the header has {len(matches)} columns {column.name}",
                 where=self.place,
                 because=self.header_text,
-                instead="keep one",
+                instead="keep one of them",
             )
         index, unit = matches[0]
         word = self.words[index]
@@ -459,7 +462,7 @@ def read(
     none. what: the cure of that refusal, the columns that the file should have.
     most_lines: from the top of the file, by default all."""
     if not isinstance(path, (str, Path)):
-        raise Refusal("a table must be the name of a file", value=path)
+        raise Refusal("a table must be given by the name of its file", value=path)
     name = Path(path).name
     try:
         raw = files.read(path, largest)
@@ -480,7 +483,7 @@ def read(
     lines, comments = _without_comments(text)
     separator = _separator([line for _, line in lines[:SAMPLE_LINES]])
     if separator != ",":
-        notes.append(f"columns are parted by {SEPARATORS[separator]}")
+        notes.append(f"columns are separated by {SEPARATORS[separator]}")
     # A line of separators alone is empty.
     lines = [(k, line) for k, line in lines if line.strip(separator + ' "\t')]
     with located(name):
@@ -488,9 +491,9 @@ def read(
     if line is None:
         columns = len(split(lines[0][1], separator))
         raise Refusal(
-            f"it has no header: its first line has {columns} numbers",
+            f"the file has no header: its first line has {columns} numbers",
             where=f"{name}, line {lines[0][0]}",
-            instead=f"put a line with the names of its {columns} columns above; {what}",
+            instead=f"add a line above with the names of its {columns} columns; {what}",
         )
     words, rows = _without_empty_column(words, rows, separator)
     rows = _without_cut_end(rows, len(words), separator, notes)
@@ -551,7 +554,9 @@ def _decode(raw: bytes) -> tuple[str | None, list[str]]:
     if CONTROL.search(text):
         return None, notes
     if encoding == "cp1252":
-        notes.append("its letters are read as Windows-1252, as they are not UTF-8")
+        notes.append(
+            "its characters are read as Windows-1252 because they are not valid UTF-8"
+        )
     elif encoding != "utf-8-sig":
         notes.append("it is UTF-16")
     return text.replace("\r\n", "\n").replace("\r", "\n"), notes
@@ -659,12 +664,12 @@ def _find_header(
         head -= 1
     line, _ = lines[head]
     if head > 0:
-        notes.append(f"the lines above line {line}, its header, are no rows")
+        notes.append(f"the lines above the header in line {line} are ignored")
         comments[:0] = lines[:head]
     header = cells[head]
     if units and len(units) == len(header):
         unit_line, _ = lines[below - 1]
-        notes.append(f"line {unit_line} is one of units")
+        notes.append(f"line {unit_line} contains units")
         with located(f"line {unit_line}"):
             header = [_with_unit(word, unit) for word, unit in zip(header, units)]
     # ROS writes a % before the header.
@@ -718,7 +723,9 @@ def _with_unit(word: str, unit: str) -> str:
     unit = unit.strip("()[]- ")
     _, unit_of_word = split_unit(word)
     if unit_of_word and unit_of(unit) not in ("", unit_of_word):
-        raise Refusal(f"{word} is in {unit} here", instead="keep one of the units")
+        raise Refusal(
+            f"{word} is in {unit} here", instead=("keep one of the units of the units")
+        )
     if unit_of_word or not unit:
         return word
     return f"{word} ({unit})"
@@ -740,7 +747,7 @@ def _header_in_comment(
         line, text = above[-1]
         words = split(text, separator)
         if len(words) == width and _is_words(words):
-            notes.append(f"the comment in line {line} is its header")
+            notes.append(f"the comment in line {line} is read as the header")
             comments.remove((line, text))
             return line, words, lines
     return None, [], lines
@@ -788,7 +795,7 @@ def _without_cut_end(
     first = rows[end][0]
     last = rows[-1][0]
     lines = f"{first}" if first == last else f"{first} to {last}"
-    notes.append(f"line {lines} at its end is no whole row, and is left out")
+    notes.append(f"line {lines} at the end of the file is incomplete and is left out")
     return rows[:end]
 
 
@@ -814,7 +821,7 @@ def _decimal_mark(rows: list[tuple[int, str]], separator: str, name: str) -> str
         return ","
     line, cell = thousands
     raise Refusal(
-        f"{formatted(cell, 30)} may have a decimal comma, or group thousands",
+        f"{formatted(cell, 30)} may have a decimal comma or thousands separators",
         where=f"{name}, line {line}",
-        instead="write numbers with a decimal point, without groups",
+        instead="write numbers with a decimal point and without thousands separators",
     )

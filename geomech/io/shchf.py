@@ -74,7 +74,7 @@ def _curve(variables: Mapping, number: int) -> Curve:
             t = np.linspace(0.0, 1.0, len(path))
             return _curve_through("p.phi_locus_full", t, path)
     if number != 1:
-        raise Refusal(f"has one gait, and no {number}", instead="drop number")
+        raise Refusal(f"has one gait, but no number {number}", instead="remove number")
     columns = _columns(variables, "alpha")
     if columns:
         t = np.linspace(0.0, 1.0, len(columns[0]))
@@ -83,9 +83,9 @@ def _curve(variables: Mapping, number: int) -> Curve:
         fits = all(len(x) == len(t) for x in columns)
         if not fits or len(t) < 4 or not (np.diff(t) > 0).all():
             raise Refusal(
-                "has alpha1, alpha2, ... and t that are no four shapes or more at "
-                "ascending times",
-                instead="mend it",
+                "has alpha1, alpha2, ... and t that are not four or more shapes at "
+                "increasing times",
+                instead="correct the file",
             )
         return _curve_through("alpha1, alpha2, ...", t, np.stack(columns, -1))
     cos = _columns(variables, "A")
@@ -94,8 +94,8 @@ def _curve(variables: Mapping, number: int) -> Curve:
     if not cos or len(cos) != len(sin) or not has_one_length or len(cos[0]) < 2:
         raise Refusal(
             "has no gait",
-            because=f"one is {FORMS}",
-            instead="save one of these: function handles are not run",
+            because=f"a gait is {FORMS}",
+            instead="save one of these: function handles cannot be read",
         )
     return Curve("", cos=np.array(cos), sin=np.array(sin))
 
@@ -120,15 +120,15 @@ def _path(p: Mapping, number: int) -> np.ndarray | None:
         return None
     if not 1 <= number <= paths.size:
         raise Refusal(
-            f"has {paths.size} gaits, and no {number}",
-            instead=f"take number = 1 to {paths.size}",
+            f"has {paths.size} gaits, but no number {number}",
+            instead=f"use number = 1 to {paths.size}",
         )
     path = paths.ravel(order="F")[number - 1]
     shape = path.get("shape") if isinstance(path, dict) else None
     if not isinstance(shape, np.ndarray) or shape.ndim != 2:
         raise Refusal(
             f"has p.phi_locus_full{{{number}}} without shapes",
-            instead="compute the path anew in sysplotter",
+            instead="compute the path again in sysplotter",
         )
     return checked_numbers(f"p.phi_locus_full{{{number}}}.shape", shape)
 
@@ -139,15 +139,15 @@ def _curve_through(name: str, t: np.ndarray, points: np.ndarray) -> Curve:
     if np.abs(points).max() > LARGEST_ANGLE:
         raise Refusal(
             f"has {name} up to {np.abs(points).max():.4g} where angles are in rad",
-            instead="convert it",
+            instead="convert them to rad",
         )
     gap = np.linalg.norm(points[-1] - points[0])
     size = np.ptp(points, axis=0).max()
     if len(points) < 4 or not gap <= CLOSED * size:
         raise Refusal(
-            f"has {name} that do not close",
-            because=f"the last shape is {gap:.3g} rad from the first",
-            instead="end it where it begins",
+            f"has {name} that do not form a closed curve",
+            because=f"the last shape is {gap:.3g} rad away from the first",
+            instead="let it end where it begins",
         )
     points = np.concatenate([points[:-1], points[:1]])
     return Curve("", 2 * np.pi * (t - t[0]) / (t[-1] - t[0]), points)

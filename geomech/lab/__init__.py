@@ -56,9 +56,9 @@ def check_format(path: Path) -> None:
     """Refuse a name of another format."""
     if path.suffix.lower() not in (".html", ".htm"):
         raise Refusal(
-            "the gait lab is a page",
+            "the gait lab is an HTML page",
             value=str(path),
-            instead="name a file that ends in .html",
+            instead="give a file name that ends in .html",
         )
 
 

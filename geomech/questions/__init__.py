@@ -10,7 +10,7 @@ follow from its class.
 from importlib import import_module
 from typing import Any
 
-# By the headings of `geomech --help`, in its order: the module of a question, named
+# By the headings of `geomech --help-all`, in its order: the module of a question, named
 # after it, and the line of its command, which is given here so that the list of
 # commands loads no question.
 GROUPS = {
@@ -34,7 +34,7 @@ GROUPS = {
         ),
         "terradynamics.intrude": "Compute force and moment of grains on a moving body.",
         "terradynamics.walk": "Compute how a robot walks on grains.",
-        "grains.grains": "Let rigid links swim in a bed of grains, beside the tiers.",
+        "grains.grains": "Simulate rigid links that swim in a bed of grains.",
         "grains.drag_grains": "Measure the drag of grains on a rod and on its ends.",
     },
     "Your own data": {

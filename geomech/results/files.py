@@ -123,7 +123,7 @@ def load(path: str | Path) -> Result:
     """Return the result in a file: of .nc, .json and .mat as it was written, of .csv
     the columns. Refusal for another ending, or a file without a result."""
     if not isinstance(path, (str, Path)):
-        raise Refusal("a result must be the name of its file", value=path)
+        raise Refusal("a result must be given by the name of its file", value=path)
     path = Path(path)
     if path.suffix.lower() not in READERS:
         raise Refusal(
@@ -141,5 +141,5 @@ def load(path: str | Path) -> Result:
         raise Refusal(
             f"{path} holds no result",
             because=reason,
-            instead="give a file of a result",
+            instead="give a file of a saved result",
         ) from None

@@ -83,5 +83,5 @@ def _refuse_other(result: Result) -> None:
     if "gait" not in result or "gait_A" not in result:
         raise Refusal(
             "this result has no mean gait",
-            instead="give one of ``fit_gait`` of a log of joint angles",
+            instead="give a result of ``fit_gait`` for a log of joint angles",
         )

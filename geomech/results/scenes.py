@@ -31,7 +31,7 @@ def best_scene(result: Result) -> Any:
     if "best_scene_toml" not in result.attributes:
         raise Refusal(
             "this result has no best scene",
-            instead="give one of ``optimize``, of a scene that a file can hold",
+            instead="give a result of ``optimize`` for a scene that a file can hold",
         )
     return _parsed(result, "best_scene_toml")
 
@@ -53,7 +53,9 @@ def fitted_medium(result: Result) -> Any:
     """
     require_result(result)
     if "medium_toml" not in result.attributes:
-        raise Refusal("this result has no medium", instead="give one of ``fit_medium``")
+        raise Refusal(
+            "this result has no medium", instead=("give a result of ``fit_medium``")
+        )
     return medium_in(result.attributes["medium_toml"])
 
 
@@ -61,7 +63,7 @@ def require_result(result: object) -> None:
     """Refuse what is no result, such as the name of its file."""
     if not isinstance(result, Result):
         raise Refusal(
-            "the result must be one of a question, or of load_result(FILE)",
+            "the result must come from a question or from load_result(FILE)",
             value=result,
         )
 
@@ -69,7 +71,7 @@ def require_result(result: object) -> None:
 def _parsed(result: Result, attribute: str) -> Any:
     if attribute not in result.attributes:
         raise Refusal(
-            "the file of this result does not have its scene",
+            "the file of this result does not contain its scene",
             instead="compute it again to draw it",
         )
     name = result.attributes.get("scene", "scene")

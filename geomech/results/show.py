@@ -160,7 +160,7 @@ def scalar(variable: Variable) -> str:
     if is_error(variable):
         shown = f"{cell(variable, float(variable))} {unit}".rstrip()
     if variable.spread is not None:
-        shown += f", +- {size(float(variable.spread))} by the medium"
+        shown += f", +- {size(float(variable.spread))} from the medium"
     return shown
 
 

@@ -75,7 +75,7 @@ class Cost(NamedTuple):
         return self._replace(seconds=self.besides + factor * of_balances)
 
     def check(
-        self, place: str, yes: bool, cheaper_alternative: str = "ask for less"
+        self, place: str, yes: bool, cheaper_alternative: str = "request less"
     ) -> None:
         """Raise `TooLong` beyond the limits unless ``yes``. cheaper_alternative: advice
         on a smaller request."""
@@ -84,7 +84,7 @@ class Cost(NamedTuple):
             raise TooLong(
                 str(self),
                 where=place,
-                instead=f"to compute for more than {limits} say ``yes``, or "
+                instead=f"to compute for more than {limits} use ``yes``, or "
                 f"{cheaper_alternative}",
             )
 

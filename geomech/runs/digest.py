@@ -100,7 +100,7 @@ def _contents(x: Any) -> tuple:
             if name not in cached:
                 attributes[name] = value
         return "object", kind, attributes
-    raise Undigestible(f"the content of a {kind.__qualname__} cannot be told")
+    raise Undigestible(f"the content of a {kind.__qualname__} cannot be determined")
 
 
 def _cached_properties(kind: type) -> set[str]:

@@ -76,7 +76,7 @@ class Processes:
                 with contextlib.suppress(BrokenExecutor):
                     return self._started_pool().submit(task, *arguments)
                 self.pool = None
-        raise BrokenExecutor("processes end as soon as they are started")
+        raise BrokenExecutor("processes end as soon as they start")
 
     def _started_pool(self):
         if self.pool is None:
@@ -202,8 +202,8 @@ class Cluster:
         raise Refusal(
             why,
             where=self.place,
-            instead="give the address of a Dask scheduler, such as "
-            "tcp://127.0.0.1:8786, that runs ('dask scheduler'), or leave it out",
+            instead="give the address of a Dask scheduler that runs ('dask "
+            "scheduler'), such as tcp://127.0.0.1:8786, or leave it out",
         )
 
     def _open_client(self, distributed, answer: Future) -> None:
@@ -230,7 +230,7 @@ class Cluster:
                 raise Refusal(
                     "it has no workers",
                     where=self.place,
-                    instead=f"start some ('dask worker {self.address}')",
+                    instead=f"start workers ('dask worker {self.address}')",
                 )
             time.sleep(0.05)
         try:
@@ -239,7 +239,7 @@ class Cluster:
             raise Refusal(
                 f"its workers cannot load geomech ({formatted(str(error), 120)})",
                 where=self.place,
-                instead="install it there",
+                instead="install geomech there",
             ) from None
         back_ends = []
         for worker, (version, back_end) in workers.items():
@@ -247,7 +247,7 @@ class Cluster:
                 raise Refusal(
                     f"the worker {worker} has {version}, this command {VERSION}",
                     where=self.place,
-                    instead="install the same there",
+                    instead="install the same version there",
                 )
             back_ends.append(back_end)
         return min(back_ends, key=BACKENDS.index)
@@ -271,8 +271,8 @@ class Cluster:
         if future.done() or self.has_warned or self._count_threads():
             return
         note(
-            f"{spell_arguments(self.place)}: no workers are left: waiting for others "
-            f"('dask worker {self.address}')"
+            f"{spell_arguments(self.place)}: no workers are left; waiting for new "
+            f"ones ('dask worker {self.address}')"
         )
         self.has_warned = True
 
@@ -280,10 +280,10 @@ class Cluster:
         name = type(error).__name__
         if name == "KilledWorker":
             meaning = (
-                "workers were ended again and again at the same part: out of memory?"
+                "workers were ended repeatedly during the same task: out of memory?"
             )
         elif name in CONNECTION_ERRORS:
-            meaning = "the scheduler, or the connection to it, was lost"
+            meaning = "the scheduler or the connection to it was lost"
         else:
             meaning = f"{name}: {formatted(str(error), 120)}"
         return RuntimeError(f"{spell_arguments(self.place)}: {meaning}")
@@ -298,7 +298,7 @@ def _import_distributed():
         import distributed
     except ImportError as error:
         raise Refusal(
-            f"``scheduler`` takes the package distributed ({error})",
+            f"``scheduler`` needs the package distributed ({error})",
             instead="pip install 'geomech[distributed]'",
         ) from None
     return distributed

@@ -151,13 +151,14 @@ class TaskQueue:
         cure = "put it in a module"
         if self.executor.remote:
             raise Refusal(
-                "a cluster cannot know what is to be computed",
+                "a cluster does not know what to compute",
                 because=str(error),
                 instead=cure,
             ) from None
         if error.is_told:
             warnings.warn(
-                f"computed by one process, others cannot know it: {error}: {cure}",
+                "computed by one process, because others do not know it: "
+                f"{error}: {cure}",
                 Note,
                 stacklevel=7,
             )
@@ -215,8 +216,8 @@ class PendingTask:
             except Exception as error:
                 raise self.executor.failure(error) from error
         raise RuntimeError(
-            f"a worker process was ended {MAX_TRIES} times at the same part: out of "
-            "memory? Take fewer workers"
+            f"a worker process was ended {MAX_TRIES} times during the same task: out "
+            "of memory? Use fewer workers"
         )
 
     def _wait(self) -> Any:

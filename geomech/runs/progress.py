@@ -44,7 +44,7 @@ class Computation:
     def __str__(self) -> str:
         seconds = self.seconds
         if not 0 < self.fraction < 1:
-            return f"{self.title}: under way for {seconds:.0f} s"
+            return f"{self.title}: running for {seconds:.0f} s"
         percent = 100 * self.fraction
         remaining = seconds * (1 / self.fraction - 1)
         return (

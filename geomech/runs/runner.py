@@ -231,7 +231,7 @@ def store_results(
         store = Store(path, output is not None, BACKENDS.index(fastest()))
     except Busy:
         raise Refusal(
-            f"another computation to {output} is under way",
+            f"another computation with the output {output} is running",
             instead="wait for it, stop it, or choose another output with -o",
         ) from None
     back_end = BACKENDS[min(store.mark, len(BACKENDS) - 1)]
@@ -255,7 +255,7 @@ def _close_after(error: BaseException, store: Store) -> None:
         store.commit()
     if store.written:
         error.add_note(
-            f"{store.written} results so far are kept in {store.path}: the same "
-            "command goes on from there"
+            f"{store.written} results are stored in {store.path}: repeat the command "
+            "to continue from there"
         )
     store.close(done=not store.written)

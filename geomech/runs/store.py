@@ -142,7 +142,7 @@ class Store:
                 decode(raw, kind)
             except (ValueError, TypeError) as error:
                 raise TypeError(
-                    f"a task declares {kind} and returns something else: {error}"
+                    f"a task declares {kind} but returns a different type: {error}"
                 ) from None
             self.readable.add(repr(kind))
         self.new[key] = (raw, _checksum(key, raw))
@@ -199,8 +199,8 @@ class Store:
     def _open(self) -> None:
         if os.path.lexists(self.path) and not self.path.is_file():
             raise Refusal(
-                f"cannot keep what is done in {self.path}",
-                because="it is no ordinary file",
+                f"cannot store results in {self.path}",
+                because="it is not an ordinary file",
                 instead="remove it, or choose another output",
             )
         self._try(self._connect)
@@ -219,7 +219,7 @@ class Store:
         if self.db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
             (application_id,) = self.db.execute("PRAGMA application_id").fetchone()
             if application_id != APPLICATION_ID:
-                raise ForeignFile("it is of another program")
+                raise ForeignFile("it was written by another program")
             (mark,) = self.db.execute("PRAGMA user_version").fetchone()
             if mark < 0:
                 raise Damaged
@@ -253,7 +253,7 @@ class Store:
                 if self.hold:
                     raise Busy(
                         f"another computation has {self.path} open",
-                        instead="wait for it, stop it, or name another",
+                        instead="wait for it, stop it, or use another file",
                     ) from None
             elif isinstance(error, ForeignFile):
                 self._disconnect()
@@ -292,7 +292,7 @@ class Store:
     def _give_up(self, error: Exception) -> None:
         """Note that nothing more is stored; earlier results stay, and so does the
         lock."""
-        note(f"what is done is not kept in {self.path}: {error}")
+        note(f"results are not stored in {self.path}: {error}")
         self._stop_storing()
         if self.db is not None:
             with contextlib.suppress(sqlite3.Error):

@@ -73,7 +73,8 @@ def pack(task: Callable, common: Any, back_end: str) -> TaskPayload:
     for module, name in classes:
         if module == "__main__" or "<locals>" in name:
             raise NotPicklable(
-                f"the class {name} is of the program that runs, or of a function in it",
+                f"the class {name} is defined in the script that runs, or inside "
+                "one of its functions",
                 is_told=True,
             )
     try:
@@ -81,7 +82,7 @@ def pack(task: Callable, common: Any, back_end: str) -> TaskPayload:
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         raise NotPicklable(str(error)) from None
     if b"__main__" in work:
-        raise NotPicklable("it has to do with the program that runs", is_told=True)
+        raise NotPicklable("it depends on the script that runs", is_told=True)
     return TaskPayload(VERSION, back_end, kinds.files(), classes, work)
 
 
@@ -104,7 +105,7 @@ def load_task(payload: TaskPayload) -> tuple[Callable, Any]:
     if payload.version != VERSION:
         raise Refusal(
             f"a worker has {VERSION}, this command {payload.version}",
-            instead="install the same there",
+            instead="install the same version there",
         )
     if payload.plugins or payload.classes:
         register_plugins(payload)

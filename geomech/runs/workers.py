@@ -63,7 +63,8 @@ def _executor(count: int | None, scheduler: str | None) -> Executor | None:
     if scheduler is not None:
         if count is not None:
             raise Refusal(
-                "``workers`` are processes of this machine, ``scheduler`` has its own",
+                "``workers`` are processes of this machine, and ``scheduler`` has "
+                "its own workers",
                 instead="give one of the two",
             )
         return Cluster(scheduler)

@@ -25,7 +25,7 @@ def framed(system: System, numerics: Numerics) -> System:
     if shapes > largest:
         raise Refusal(
             f"a frame on a grid of {numerics.grid}^{inner.joints} shapes is too large",
-            instead="lower [numerics] grid, or take a body of two shape variables, "
+            instead="lower [numerics] grid, or use a body of two shape variables, "
             "such as a chain with [body] modes or a serpenoid",
         )
     axes = connection.grid(inner.joints, numerics.grid, numerics.extent)

@@ -75,12 +75,13 @@ def registry_of(part: Any) -> Registry:
         if registry.admits(part):
             return registry
     raise Refusal(
-        f"{formatted(part)} is no part of a scene",
-        because="a law is a class with `traction`, a body one with `motion`, `joints` "
-        "and `length`, a system one with `velocity`, `joints`, `length` and `traits`, "
-        "or a function velocity(alpha, alphadot) with joints = ...; a function "
-        "positions(alpha) with joints and lengths = ... is a body; a gait is derived "
-        "from geomech.mathematics.gaits.Gait, an effect from rft.effects.Effect",
+        f"{formatted(part)} cannot be a part of a scene",
+        because="a law is a class with `traction`; a body is a class with `motion`, "
+        "`joints` and `length`, or a function positions(alpha) with joints "
+        "and lengths = ...; a system is a class with `velocity`, `joints`, "
+        "`length` and `traits`, or a function velocity(alpha, alphadot) with "
+        "joints = ...; a gait is derived from geomech.mathematics.gaits.Gait "
+        "and an effect from rft.effects.Effect",
         instead="a tier is a geomech.mathematics.tiers.Tier",
     )
 
@@ -90,11 +91,13 @@ def load_file(path: str | Path) -> list[str]:
     and return the names. Refusal if it cannot be run, has no such class, or one of them
     cannot be registered; then none is registered."""
     if not isinstance(path, (str, Path)):
-        raise Refusal("a file of one's own is named by text", value=path)
+        raise Refusal(
+            "a file with your own parts must be given by its name", value=path
+        )
     path = Path(path)
     place = f"``plugin`` {path}"
     if path.suffix != ".py":
-        raise Refusal("give a Python file, with a name that ends in .py", where=place)
+        raise Refusal("give a Python file whose name ends in .py", where=place)
     try:
         text = read_text(path, LARGEST)
     except (OSError, ValueError) as error:
@@ -135,8 +138,8 @@ def _load(path: Path, full_name: str, text: str) -> list[str]:
                 names.append(name)
         if not names:
             raise Refusal(
-                'no class in it has a law = "..." (a force law) or kind = "..." '
-                "(all else)",
+                'no class in it has a law = "..." (for a force law) or a kind = "..." '
+                "(for other parts)",
                 where=place,
             )
     _sources[module.__name__] = text.encode()

@@ -27,14 +27,14 @@ FORCES = (Column("f_t"), Column("f_n"))  # in place of the forces on a rod
 
 @dataclass(frozen=True)
 class NamedMedium:
-    """By name, with no key beside it."""
+    """A medium of the catalogue, without other keys."""
 
     name: Annotated[
         str,
         Word(
             MEDIA,
-            f"a medium of the catalogue: {', '.join(MEDIA)}; 'geomech scenes --show "
-            "NAME' prints one",
+            f"name of a medium in the catalogue: {', '.join(MEDIA)}; "
+            "'geomech scenes --show NAME' prints one",
         ),
     ]
 
@@ -45,9 +45,10 @@ class NamedMedium:
 
 @dataclass(frozen=True)
 class MediumFile:
-    """From a file.
+    """A medium from a file.
 
-    file (-): TOML of a medium, as geomech fit-medium writes it, with no key beside it.
+    file (-): name of a TOML file with a medium, such as geomech fit-medium writes,
+    without other keys.
     """
 
     file: str
@@ -84,7 +85,7 @@ def _medium_table(place: str, path: Path) -> dict:
     table = tables.get("medium", tables)
     if not isinstance(table, dict) or (table is not tables and len(tables) > 1):
         raise Refusal(
-            f"{path.name} must hold one table [medium] and nothing else", where=place
+            f"{path.name} must contain one table [medium] and nothing else", where=place
         )
     if not {"law", "name"} & {*table}:
         raise Refusal(
@@ -125,7 +126,7 @@ def _drag_table(place: str, file: str) -> dict[str, list]:
 
 DRAG = FromFile(
     _drag_table,
-    "CSV with the header psi_deg,f_t,f_n, in place of psi, f_t and f_n",
+    "CSV with the header psi_deg,f_t,f_n, instead of psi, f_t and f_n",
     ("psi", "f_t", "f_n"),
 )
 MEDIUM = OneOf(

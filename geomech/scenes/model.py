@@ -35,8 +35,8 @@ from geomech.scenes.medium import MEDIUM
 from rft.core.refusal import Refusal, formatted, located, printable
 
 FRAME = (
-    "of all velocities and displacements, in place of the body's own key; "
-    "'minimum-perturbation', here or there: the one in which the connection is smallest"
+    "frame of all velocities and displacements, instead of the key in the body; "
+    "'minimum-perturbation' selects the frame in which the connection is smallest"
 )
 SHORT = "swimmer"  # the kind of system whose sections may stand by themselves
 SWIMMER = {
@@ -198,16 +198,16 @@ def _check_joints(system: System, gait: Gait) -> None:
     if gait.joints == system.joints:
         return
     owner = f"the {kind_of(system)}"
-    cure = "give it another gait"
+    cure = "use another gait"
     if hasattr(system, "body"):
         owner = "[body]"
         cure = (
             "give the body one link more than the gait has joints, or as many modes, "
-            "or another gait"
+            "or use another gait"
         )
     raise Refusal(
-        f"[gait] {type(gait).__name__.lower()} moves {gait.joints} joints but {owner} "
-        f"has {system.joints}",
+        f"[gait] {type(gait).__name__.lower()} moves {gait.joints} joints, but "
+        f"{owner} has {system.joints}",
         instead=cure,
     )
 
@@ -216,7 +216,7 @@ def checked_scene(scene: Any) -> Scene:
     """Return the scene; Refusal if it is none."""
     if not isinstance(scene, Scene):
         raise Refusal(
-            "scene must be a Scene, such as geomech.scenes.load gives", value=scene
+            "scene must be a Scene, such as geomech.scenes.load returns", value=scene
         )
     return scene
 
@@ -234,7 +234,7 @@ def frequency_of(system: System, gait: Gait) -> float | None:
         raise Refusal(
             f"[gait] frequency = {gait_frequency:g}, but the effects of the "
             f"{kind_of(system)} have {formatted(effect_frequency)}",
-            because="it is one swimmer",
-            instead="keep one",
+            because="both describe one swimmer",
+            instead="keep one of them",
         )
     return gait_frequency

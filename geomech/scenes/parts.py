@@ -43,10 +43,10 @@ def as_scene(
     if scene is None:
         scene = _assemble(parts, tuple(effects), joints)
     elif joints is not None:
-        raise Refusal("``joints`` are those of a velocity", instead="drop it")
+        raise Refusal("``joints`` applies only to a velocity", instead="leave it out")
     elif effects:
         raise Refusal(
-            "effects are those of a medium and a body",
+            "effects apply only to a medium and a body",
             instead="add [[effects]] to the scene",
         )
     if numerics:
@@ -84,18 +84,20 @@ def _assemble(parts: Sequence, effects: tuple, joints: int | None) -> Scene:
     counts = (len(media), len(bodies), len(others))
     if counts == (1, 1, 0) and len(gaits) <= 1:
         if joints is not None:
-            raise Refusal("``joints`` are those of a velocity", instead="drop it")
+            raise Refusal(
+                "``joints`` applies only to a velocity", instead="leave it out"
+            )
         system: System = Swimmer(media[0], bodies[0], effects)
     elif counts == (0, 0, 1) and len(gaits) <= 1 and not effects and _moves(others[0]):
         system = as_system(others[0], _joints_of(others[0], gaits, joints))
         if joints not in (None, system.joints):
             raise Refusal(
                 f"``joints`` is {joints}, but the velocity has {system.joints}",
-                instead="drop it",
+                instead="leave it out",
             )
     else:
         listed = ", ".join(formatted(part, PART_WIDTH) for part in parts) or "nothing"
-        raise Refusal(f"no scene of {listed}", instead=FORMS)
+        raise Refusal(f"{listed} do not form a scene", instead=FORMS)
     gait = gaits[0] if gaits else _default_gait(system.joints)
     return Scene(system, gait)
 
@@ -112,8 +114,8 @@ def _joints_of(velocity: Any, gaits: Sequence, joints: int | None) -> int:
     for n in range(1, MOST_JOINTS + 1):
         if _takes(velocity, n):
             raise Refusal(
-                f"the velocity takes {n} joints",
-                because="without a gait it is taken for one of two",
+                f"the velocity needs {n} joints",
+                because="without a gait two joints are assumed",
                 instead=f"give ``joints`` = {n}, or a gait",
             )
     return 2
@@ -151,8 +153,8 @@ def _default_gait(joints: int) -> Gait:
     """Return the gait of a system without one."""
     if joints > MOST_JOINTS:
         raise Refusal(
-            f"a body of {joints} joints has no usual gait",
-            instead="give one, such as Wave or Sine",
+            f"no default gait exists for a body of {joints} joints",
+            instead="give a gait such as Wave or Sine",
         )
     if joints == 2:
         return Circle()

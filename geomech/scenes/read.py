@@ -223,7 +223,7 @@ def parse(text: str, name: str = "scene") -> Scene | Any:
     0.5
     """
     if not isinstance(text, str):
-        raise Refusal("a scene is a TOML text", value=text, where=formatted(name))
+        raise Refusal("a scene must be a TOML text", value=text, where=formatted(name))
     try:
         tables = tables_of(text)
     except ValueError as error:  # no TOML, or an integer with too many digits
@@ -259,7 +259,7 @@ def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | An
     """
     if not isinstance(tables, Mapping):
         raise Refusal(
-            "a scene is a dict of tables", value=tables, where=formatted(name)
+            "a scene must be a dict of tables", value=tables, where=formatted(name)
         )
     if "robot" in tables:
         from geomech.scenes.terradynamics.walker import WalkerScene, with_implied_names

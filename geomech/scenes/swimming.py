@@ -69,7 +69,7 @@ def _system_table(tables: Mapping, name: str) -> dict:
         raise Refusal(
             f"a {kind} takes no {sorted(short)[0]!r}",
             where=name,
-            instead="drop it, or the table [system]",
+            instead="remove it, or the table [system]",
         )
     return short | dict(table)
 
@@ -130,7 +130,7 @@ def _without_fitted(tables: Mapping, name: str) -> tuple[dict, bool]:
             f"[{places[0]}] frame = {FITTED!r}, but the scene's frame = "
             f"{scene_frame!r}",
             where=name,
-            instead="keep one",
+            instead="keep one of them",
         )
     return tables, bool(places)
 

@@ -191,9 +191,7 @@ def _written_tables(scene: Scene | Intruding | WalkerScene) -> dict:
         if isinstance(scene, Scene):
             tables = _shortened(tables, scene)
         if from_tables(tables, scene.name) != scene:
-            raise Refusal(
-                "a part of this scene is of no kind that a scene file can name"
-            )
+            raise Refusal("a part of this scene has no kind that a scene file can name")
         return tables
 
 
@@ -213,12 +211,12 @@ def _section(part: Any, section: Section) -> dict:
             return _variant_table(part, variant)
         if fits or isinstance(section, Keys):
             raise Refusal(
-                f"a {type(part).__name__} has a CSV file of its own",
-                instead="write the scene that names it by hand",
+                f"a {type(part).__name__} is stored in a separate CSV file",
+                instead="write the scene that names this file yourself",
             )
     kind = name_in(section.kinds, part)
     raise Refusal(
-        f"a {kind} is of no kind that a scene file can name",
+        f"a {kind} has no kind that a scene file can name",
         instead=f"use one of {', '.join(section.kinds)}",
     )
 

@@ -11,11 +11,32 @@ from importlib import import_module
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from geomech import __version__, questions
 from geomech.shell import describe, renamed, terminal
-from geomech.shell.options import PluginOption, load_plugins, with_plugins, with_workers
+from geomech.shell.options import (
+    ADVANCED,
+    PluginOption,
+    load_plugins,
+    with_plugins,
+    with_workers,
+)
+
+# Commands in `geomech --help`, which fits a terminal of 24 lines; `geomech --help-all`
+# has all.
+COMMON = (
+    "scenes",
+    "displacement",
+    "ccf",
+    "connection",
+    "run",
+    "sweep",
+    "optimize",
+    "fit_medium",
+)
+COMPLETION = ("install_completion", "show_completion")  # options of the full help
+FULL = f"{__name__}.full"  # of a context: whether its help lists everything
 
 
 class Commands(Mapping[str, Any]):
@@ -36,7 +57,8 @@ class Commands(Mapping[str, Any]):
 
 
 class Group(TyperGroup):
-    """Commands that are loaded when they are called, listed under headings."""
+    """Commands that are loaded when they are called. The help lists the most common
+    ones, the full help all of them under headings."""
 
     def __init__(self, **settings: Any):
         super().__init__(**settings)
@@ -45,15 +67,55 @@ class Group(TyperGroup):
     def list_commands(self, ctx: Any) -> list[str]:
         return [*self.commands]
 
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        rows = []
+        for parameter in self.get_params(ctx):
+            row = parameter.get_help_record(ctx)
+            if row is not None and (
+                FULL in ctx.meta or parameter.name not in COMPLETION
+            ):
+                rows.append(row)
+        with formatter.section("Options"):
+            formatter.write_dl(rows)
+        self.format_commands(ctx, formatter)
+
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        width = max(map(len, self.list_commands(ctx)))
-        for heading, names in headings().items():
-            rows = [(command_word(name).ljust(width), summary(name)) for name in names]
+        groups = headings()
+        if FULL not in ctx.meta:
+            groups = {"Commands": [*COMMON]}
+        names = [name for group in groups.values() for name in group]
+        width = max(map(len, names))
+        for heading, group in groups.items():
+            rows = [(command_word(name).ljust(width), summary(name)) for name in group]
             with formatter.section(heading):
                 formatter.write_dl(rows)
+        others = sorted({*self.list_commands(ctx)} - {*map(command_word, names)})
+        if others:
+            formatter.write_paragraph()
+            formatter.write_text(
+                f"'geomech --help-all' also describes {', '.join(others)}."
+            )
 
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple:
         return super().resolve_command(ctx, renamed.current(args))
+
+
+class Command(TyperCommand):
+    """A command whose help lists options under headings; those that few need come
+    last."""
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        rows: dict[str, list] = {}
+        for parameter in self.get_params(ctx):
+            row = parameter.get_help_record(ctx)
+            if row is not None:
+                heading = getattr(parameter, "rich_help_panel", None)
+                if parameter.param_type_name == "argument":
+                    heading = "Arguments"
+                rows.setdefault(heading or "Options", []).append(row)
+        for heading in sorted(rows, key=lambda heading: heading == ADVANCED):
+            with formatter.section(heading):
+                formatter.write_dl(rows[heading])
 
 
 def headings() -> dict[str, list[str]]:
@@ -83,7 +145,7 @@ def load_command(name: str) -> Any:
     single = typer.Typer(
         pretty_exceptions_enable=False, rich_markup_mode=None, add_completion=False
     )
-    single.command(command_word(name))(with_plugins(function(name)))
+    single.command(command_word(name), cls=Command)(with_plugins(function(name)))
     return typer.main.get_command(single)
 
 
@@ -108,6 +170,13 @@ def print_version(requested: bool) -> None:
         raise typer.Exit
 
 
+def print_full_help(ctx: typer.Context, requested: bool) -> None:
+    if requested:
+        ctx.meta[FULL] = True
+        print(ctx.get_help())
+        raise typer.Exit
+
+
 @app.callback()
 def geomech(
     version: Annotated[
@@ -120,6 +189,15 @@ def geomech(
         ),
     ] = False,
     plugin: PluginOption = None,
+    help_all: Annotated[
+        bool,
+        typer.Option(
+            "--help-all",
+            callback=print_full_help,
+            is_eager=True,
+            help="list all commands and exit",
+        ),
+    ] = False,
 ) -> None:
     """Geometric mechanics of locomotion: from a force law to displacement."""
     from geomech.runs.backend import at_once, prefer

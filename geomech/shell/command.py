@@ -13,7 +13,12 @@ import typer
 from geomech.questions.shared import base
 from geomech.questions.shared.base import Declared, Option, Question
 from geomech.shell import pipeline
-from geomech.shell.options import ExtentOption, GridOption, MediumOption
+from geomech.shell.options import (
+    ADVANCED,
+    ExtentOption,
+    GridOption,
+    MediumOption,
+)
 from rft.core.refusal import Refusal
 
 CHANGES = {"grid": GridOption, "extent": ExtentOption, "medium": MediumOption}
@@ -120,13 +125,15 @@ def common_parameters(question: type[Question]) -> list[inspect.Parameter]:
     found = [output_parameter(question)]
     if question.draw is not None:
         plot = typer.Option(
-            "--plot", metavar="FILE", help="draw a figure to .png, .pdf or .svg"
+            "--plot", metavar="FILE", help="draw a figure in .png, .pdf or .svg"
         )
         found.append(parameter("plot", Annotated[Optional[Path], plot], None))
-    json = typer.Option("--json", help="print JSON and nothing else")
+    json = typer.Option("--json", help="print only JSON")
     everything = typer.Option("--all", help="print all variables and rows")
     yes = typer.Option(
-        "--yes", help=f"compute even if it takes over {question.consent_beyond}"
+        "--yes",
+        help=f"compute even if it takes over {question.consent_beyond}",
+        rich_help_panel=ADVANCED,
     )
     return [
         *found,
@@ -264,9 +271,9 @@ def output_path(name: str) -> Path:
     """Return the path of an output; an empty name is refused."""
     if not name:
         raise Refusal(
-            "an empty name",
+            "the name is empty",
             where="``output``",
-            instead="name a file or a folder, '.' for this one",
+            instead="name a file or a folder, '.' for the current one",
         )
     return Path(name)
 
@@ -278,14 +285,14 @@ def refuse_unused(
     if given.get("plot") is None:
         used = declared.files.get(FOLDER, {})
         unused = without(declared.picture, used)
-        refuse_given(unused, given, "for a figure", "say --plot FILE, too")
+        refuse_given(unused, given, "for a figure", "add --plot FILE")
     used = {}
     for path in paths:
         used.update(declared.files.get(path.suffix.lower(), {}))
     for ending, options in declared.files.items():
         if ending != FOLDER:
             unused = without(options, used)
-            instead = f"say -o FILE{ending}, too"
+            instead = f"add -o FILE{ending}"
             refuse_given(unused, given, f"for a {ending} file", instead)
 
 
@@ -325,7 +332,7 @@ def output(
         return pipeline.Output(path, fill, folder=True)
     if path.suffix.lower() in PICTURES and question.draw is not None:
         raise Refusal(
-            f"cannot write {path}", instead=f"say --plot {path} for a picture"
+            f"cannot write {path}", instead=f"use --plot {path} for a picture"
         )
     writer(path, question)  # refuses an ending that is no format
     return pipeline.Output(path, partial(save, **options))

@@ -111,7 +111,7 @@ def plot_result(result: Any, **options: Any) -> Any:
     draw = kind_of(result).draw
     if draw is None:
         raise Refusal(
-            f"there is no picture of {result.kind or 'this result'}",
+            f"no picture exists of {result.kind or 'this result'}",
             instead="print it, or save it to a file",
         )
     return draw(result, **options)

@@ -15,12 +15,18 @@ from geomech.questions.shared import texts
 from geomech.questions.shared.base import SCENE_HELP
 from geomech.questions.shared.names import scene_names
 
+ADVANCED = "Advanced"  # heading, in a help, of the options that few need
+
 SceneArgument = Annotated[
     str, typer.Argument(metavar="SCENE", help=SCENE_HELP, autocompletion=scene_names)
 ]
 YesOption = Annotated[
     bool,
-    typer.Option("--yes", help="compute even if it takes over a minute or over 2 GB"),
+    typer.Option(
+        "--yes",
+        help="compute even if it takes over a minute or over 2 GB",
+        rich_help_panel=ADVANCED,
+    ),
 ]
 
 # Changes of a scene
@@ -32,7 +38,7 @@ def parse_angle(text: str | float) -> float:
         return texts.parse_number(str(text), None)
     except ValueError:
         raise typer.BadParameter(
-            f"{text!r} is no angle: give one such as 2.5 (rad) or 120deg"
+            f"{text!r} is not an angle: write one such as 2.5 (rad) or 120deg"
         ) from None
 
 
@@ -41,7 +47,8 @@ GridOption = Annotated[
     typer.Option(
         "--grid",
         metavar="N",
-        help="points of the grid per joint, in place of the scene's",
+        help="points of the grid per joint, instead of the scene's",
+        rich_help_panel=ADVANCED,
     ),
 ]
 ExtentOption = Annotated[
@@ -49,7 +56,8 @@ ExtentOption = Annotated[
     typer.Option(
         "--extent",
         metavar="ANGLE",
-        help="half width of the grid in rad, or as 120deg",
+        help="half width of the grid: 2.5 (rad) or 120deg",
+        rich_help_panel=ADVANCED,
         parser=parse_angle,
     ),
 ]
@@ -58,7 +66,7 @@ MediumOption = Annotated[
     typer.Option(
         "--medium",
         metavar="FILE",
-        help="file of a medium or of drag, in place of the scene's",
+        help="file of a medium or of drag, instead of the scene's",
     ),
 ]
 
@@ -70,7 +78,8 @@ PluginOption = Annotated[
     typer.Option(
         "--plugin",
         metavar="FILE.py",
-        help="Python file with parts of your own, such as laws",
+        help="Python file with your own parts, such as laws",
+        rich_help_panel=ADVANCED,
     ),
 ]
 SUBJECTS = {"name", "subject"}  # first arguments of commands that take plug-ins
@@ -105,7 +114,8 @@ WorkersOption = Annotated[
     typer.Option(
         "--workers",
         metavar="N",
-        help="processes for long computations, one a core if left out",
+        help="processes for long computations (default one per core)",
+        rich_help_panel=ADVANCED,
     ),
 ]
 SchedulerOption = Annotated[
@@ -113,7 +123,8 @@ SchedulerOption = Annotated[
     typer.Option(
         "--scheduler",
         metavar="ADDRESS",
-        help="Dask cluster to compute on, as tcp://10.0.0.1:8786",
+        help="Dask cluster, such as tcp://10.0.0.1:8786",
+        rich_help_panel=ADVANCED,
     ),
 ]
 

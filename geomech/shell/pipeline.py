@@ -21,7 +21,7 @@ from geomech.runs.backend import prefer_for
 from geomech.runs.cost import Cost, decide
 from geomech.shell import terminal
 from rft.core.notes import Note
-from rft.core.refusal import Refusal, in_line
+from rft.core.refusal import Refusal, in_line, spell_arguments
 
 MORE = "--all prints all variables"
 
@@ -74,7 +74,10 @@ def notes_of(result: Result) -> list[str]:
     """Return the notes of a result, which a command prints on standard error."""
     if "note" not in result:
         return []
-    return result["note"].values.tolist()
+    return [
+        spell_arguments(line, terminal.option)
+        for line in result["note"].values.tolist()
+    ]
 
 
 def printed(result: Result, as_json: bool, everything: bool) -> list[str]:
@@ -193,7 +196,7 @@ def refuse_unwritable(outputs: Sequence[Output], inputs: list[Path]) -> None:
         if real[k] in real[:k]:
             raise Refusal(
                 f"cannot write {path} twice",
-                instead="give --plot, or another output, another name",
+                instead="give --plot or the other output another name",
             )
     refuse_inputs(files, inputs)
     for k, path in enumerate(files):

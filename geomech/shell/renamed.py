@@ -42,7 +42,8 @@ def current_word(word: str, renamed: dict[str, str]) -> str:
     if old not in renamed:
         return word
     warnings.warn(
-        f"{old} is now {renamed[old]}: the old spelling goes with the next version",
+        f"{old} is now {renamed[old]}: the old spelling will be removed in the "
+        "next version",
         Note,
         stacklevel=3,
     )

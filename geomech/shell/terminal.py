@@ -191,7 +191,7 @@ def run(app: typer.Typer, argv: list[str], notes: dict[str, str]) -> int:
         raise (aborted.__cause__ or aborted) from None
     except MemoryError:
         report(
-            "error: not enough memory: lower the grid, the phases or the number of "
+            "error: not enough memory: reduce the grid, the phases or the number of "
             "amplitudes"
         )
     except BrokenPipeError:
@@ -233,14 +233,15 @@ def system_error(error: OSError) -> str:
     which commands write, has no name."""
     if error.errno in (errno.EMFILE, errno.ENFILE):
         return (
-            "too many files are open at once: raise the limit, as by 'ulimit -n 1024'"
+            "too many files are open at once: raise the limit, for example with "
+            "'ulimit -n 1024'"
         )
     *_, (frame, _) = traceback.walk_tb(error.__traceback__)
     module = frame.f_globals["__name__"]
     if error.filename is None and module.startswith(PRINTING):
         return (
-            f"cannot write to standard output: {error.strerror}; make room, or send it "
-            "elsewhere"
+            f"cannot write to standard output: {error.strerror}; free some disk "
+            "space, or redirect the output"
         )
     return str(error)
 
@@ -253,7 +254,10 @@ def stopped(stop: BaseException, argv: list[str]) -> int:
     if stored:
         text = f"{stored}: {command}"
     else:
-        text = f"nothing is kept; the same command starts anew: {command}"
+        text = (
+            "nothing is stored; the same command starts again from the beginning: "
+            f"{command}"
+        )
     report(f"error: stopped by {getattr(stop, 'name', 'SIGINT')}: {text}")
     return getattr(stop, "code", INTERRUPTED)
 

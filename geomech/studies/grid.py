@@ -233,7 +233,7 @@ def with_parameter(tables: dict, parameter: str, value: float) -> dict:
             return {**tables, "robot": {**robot, keys[0]: within}}
 
     raise Refusal(
-        "name a parameter such as gait.amplitude, medium.C or effects.end-caps.radius",
+        "use a parameter such as gait.amplitude, medium.C or effects.end-caps.radius",
         where=f"``over`` {parameter}",
     )
 
@@ -269,7 +269,7 @@ def _with_effect_key(tables: Mapping, parameter: str, value: float) -> list[dict
         raise Refusal(
             f"no effect of the scene gives {key!r}",
             where=f"``over`` {parameter}",
-            instead="name the effect, or add it",
+            instead="use an effect of the scene, or add one",
         )
     return [
         {**effect, key: value} if is_meant else effect

@@ -61,7 +61,7 @@ class SceneTables:
 
     def __init__(self, scene: Scene, tables: dict | None = None):
         if not isinstance(scene, Scene):
-            raise Refusal("a study is that of a Scene", value=scene)
+            raise Refusal("a study needs a Scene", value=scene)
         self.scene = scene
         self._tables = {} if tables is None else tables
 
@@ -92,14 +92,16 @@ class SceneTables:
         scene = self.scene
         with located(scene.name):
             if frame == scene.frame:
-                raise Refusal(f"the frame is {frame!r} already", instead="name another")
+                raise Refusal(
+                    f"the frame is {frame!r} already", instead=("choose another")
+                )
             if frame == MINIMUM_PERTURBATION:
                 system = framed(scene.system, scene.numerics)
             else:
                 try:
                     system = in_frame(scene.system, frame)
                 except Refusal as refusal:
-                    refusal.instead = f"or take {MINIMUM_PERTURBATION!r}"
+                    refusal.instead = f"or use {MINIMUM_PERTURBATION!r}"
                     raise
             return self._with_scene(scene.changed(system=system))
 

@@ -83,14 +83,16 @@ def measurement_variables(
     for name, words in texts.items():
         if any(words):
             yield Variable(name, ("setting",), np.array(words))
-    yield Variable("value", DIMS, measured.values, "", "of the setting")
-    yield Variable("seconds", DIMS, measured.seconds, "s", "of the quickest run")
+    yield Variable("value", DIMS, measured.values, "", "value of the setting")
+    yield Variable(
+        "seconds", DIMS, measured.seconds, "s", "computing time of the fastest run"
+    )
     for name, errors in measured.errors.items():
         yield Variable(name, DIMS, errors, unit, labels[name])
         orders = []
         for values, setting_errors in zip(measured.values, errors):
             orders.append(measured_order(values, setting_errors))
-        label = "measured, nan where all is rounding"
+        label = "measured order, nan where all is rounding"
         yield Variable(order_name(name), ("setting",), np.array(orders), "1", label)
 
 
@@ -120,7 +122,7 @@ def choice_variables(
     return [
         Variable("tolerance", dims, tolerances, unit),
         Variable("best_setting", dims, np.array(names)),
-        Variable("best_value", dims, values, "", "of the setting"),
+        Variable("best_value", dims, values, "", "value of the setting"),
         Variable("best_error", dims, found_errors, unit),
         Variable("best_seconds", dims, seconds, "s"),
     ]

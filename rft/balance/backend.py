@@ -31,8 +31,8 @@ def check(backend: str) -> None:
         raise Refusal(f"backend must be one of {', '.join(BACKENDS)}", value=backend)
     require(
         backend != "numba" or fastest() != "numpy",
-        "backend = 'numba' takes numba",
-        instead="pip install 'geomech[fast]', or take 'auto'",
+        "backend = 'numba' needs numba",
+        instead="pip install 'geomech[fast]', or use 'auto'",
     )
 
 

@@ -99,10 +99,10 @@ class Cache(_Cache):
             part.write_bytes(hashlib.sha256(body).digest() + body)
             os.replace(part, self.path)
         except OSError as error:
-            cure = "make room there, or set NUMBA_CACHE_DIR"
+            cure = "free some disk space there, or set NUMBA_CACHE_DIR"
             note(
-                f"compiled code is not kept in {self.path.parent}: {error.strerror}; "
-                f"{cure}"
+                f"compiled code is not stored in {self.path.parent}: "
+                f"{error.strerror}; {cure}"
             )
         finally:
             with contextlib.suppress(OSError):
@@ -119,10 +119,10 @@ class Cache(_Cache):
             action = f"it cannot be renamed ({error.strerror}): remove it"
         else:
             action = (
-                f"renamed {other.name}; it is compiled anew, python -m rft does that "
-                "at once"
+                f"renamed to {other.name}; it is compiled again (at once with python "
+                "-m rft)"
             )
-        note(f"the compiled code in {self.path} is not taken, {why}: {action}")
+        note(f"the compiled code in {self.path} is not used because {why}: {action}")
 
     def enable(self) -> None:
         """Do nothing: the file is always used."""
@@ -141,7 +141,7 @@ def cached(kernel: Any, purpose: str) -> Any:
     kernel._cache = Cache(kernel.py_func)
     kernel.compile = _naming_faults(kernel.compile)
     if not kernel._cache.path.exists():
-        print(f"compiling {purpose}: some seconds, once", file=sys.stderr)
+        print(f"compiling {purpose} (once, a few seconds)", file=sys.stderr)
     return kernel
 
 

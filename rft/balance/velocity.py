@@ -209,7 +209,8 @@ class BodyVelocity:
         if effects != () and engine(effects) != "algebraic":
             broken = negation(broken_premises(effects))
             raise Refusal(
-                f"no body velocity follows from shape alone where effects are {broken}",
+                "no body velocity follows from shape alone because the effects "
+                f"are {broken}",
                 instead="use rft.time_steps",
             )
         self._assembly = assemble(medium, body, effects, loads, pieces)
@@ -408,7 +409,7 @@ def _guess(start, batch: tuple, length: float) -> np.ndarray:
         start.shape[-1:] == (3,)
         and _broadcasts(start.shape, shape)
         and not np.isinf(start).any(),
-        f"start must be body velocities, {shape}, finite or nan where none is known",
+        f"start must be body velocities, {shape}, finite, or nan where unknown",
     )
     start = np.broadcast_to(start, shape)
     with np.errstate(over="ignore"):
@@ -467,8 +468,8 @@ def _checked(
     if not np.isfinite(x).all():
         raise Refusal(f"{name} must be finite, got {float(x[~np.isfinite(x)][0])}")
     raise Refusal(
-        f"{name} must be 0 or of a size that leaves digits to compute with, "
-        f"got {x.ravel()[:4]}"
+        f"{name} must be 0 or of a size that floating-point numbers resolve, got "
+        f"{x.ravel()[:4]}"
     )
 
 

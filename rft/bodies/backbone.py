@@ -42,7 +42,8 @@ class Backbone:
     """
 
     elements: Annotated[
-        int, Number(3, 2000, "-", "elements of the body, 3 to 2000", whole=True)
+        int,
+        Number(3, 2000, "-", "number of elements of the body, 3 to 2000", whole=True),
     ] = 100
     length: Length = None
     frame: str = "mean"
@@ -141,7 +142,10 @@ class Serpenoid(Backbone):
     """
 
     waves: Annotated[
-        float, Number(0, 500, "-", "waves on the body, > 0 and at most elements / 4")
+        float,
+        Number(
+            0, 500, "-", "number of waves on the body, > 0 and at most elements / 4"
+        ),
     ] = 1.0
     kind = "serpenoid"
 
@@ -158,8 +162,8 @@ class Serpenoid(Backbone):
 
     @property
     def shape_labels(self) -> tuple[tuple[str, str], ...]:
-        cosine = ("curvature x length, cosine", "rad")
-        sine = ("curvature x length, sine", "rad")
+        cosine = ("cosine of curvature x length", "rad")
+        sine = ("sine of curvature x length", "rad")
         return cosine, sine
 
     @cached_property
@@ -187,7 +191,7 @@ class ConstantCurvature(Backbone):
     """
 
     sections: Annotated[
-        int, Number(1, 2000, "-", "arcs, a divisor of elements", whole=True)
+        int, Number(1, 2000, "-", "number of arcs, a divisor of elements", whole=True)
     ] = 2
     kind = "constant-curvature"
 

@@ -21,7 +21,7 @@ Length = Annotated[
         1e-15,
         1e15,
         "m",
-        "length of the body; lengths are in body lengths if left out",
+        "length of the body; if it is left out, lengths are in body lengths",
     ),
 ]
 

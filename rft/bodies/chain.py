@@ -27,11 +27,11 @@ class Chain(Links):
     of mass of a uniform body and length-weighted mean heading (the paper's), or
     "link-1", "link-2" ..., centre and heading of that link.
 
-    modes (-): rows of joint angles; the shape variables are then the amplitudes m_1,
-    m_2 ... of these modes in place of the joint angles, alpha_k = sum over j of m_j
-    modes[j][k]. "serpenoid": the cosine and the sine of ``waves`` waves on the body
-    (`rft.bodies.modes`), whose circle is a travelling wave. Joint speeds, and with them
-    the regularisation, are the same as without modes.
+    modes (-): rows of joint angles. The shape variables are then the amplitudes m_1,
+    m_2 ... of these modes instead of the joint angles: alpha_k = sum over j of m_j
+    modes[j][k]. "serpenoid" selects the cosine and the sine of ``waves`` waves on the
+    body (`rft.bodies.modes`), in whose amplitudes a circle is a travelling wave. Joint
+    speeds, and with them the regularisation, are the same as without modes.
 
     Examples
     --------
@@ -52,7 +52,12 @@ class Chain(Links):
     modes: tuple[tuple[float, ...], ...] | str | None = None
     waves: Annotated[
         float | None,
-        Number(1e-6, 1e6, "-", "waves on the body, of serpenoid modes, 1 if left out"),
+        Number(
+            1e-6,
+            1e6,
+            "-",
+            "number of waves of serpenoid modes on the body; 1 if left out",
+        ),
     ] = None
     kind = "chain"
 

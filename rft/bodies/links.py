@@ -37,7 +37,7 @@ class Links:
         object.__setattr__(self, "lengths", tuple(lengths.tolist()))
         require(
             len(self.lengths) >= 2,
-            "lengths needs at least two links",
+            "lengths must have at least two links",
             value=len(self.lengths),
         )
         are_positive = all(0 < x < math.inf for x in self.lengths)
@@ -49,7 +49,8 @@ class Links:
         shortest = min(self.lengths) / sum(self.lengths)
         require(
             shortest >= 1e-12,
-            f"the shortest link must be at least 1e-12 of the body, got {shortest:.3g}",
+            "the shortest link must be at least 1e-12 of the body length, got "
+            f"{shortest:.3g}",
         )
 
     def __getstate__(self) -> dict:
@@ -149,7 +150,7 @@ class Links:
         pose = unmasked("pose", pose)
         require(
             alpha.shape[-1:] == (self.joints,),
-            f"alpha must have {self.joints} angles last",
+            f"alpha must have {self.joints} angles on its last axis",
             value=alpha.shape,
         )
         require(pose.shape[-1:] == (3,), "pose must be (x, y, theta)", value=pose.shape)

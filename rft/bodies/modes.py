@@ -23,8 +23,8 @@ def checked_modes(
     if modes is None:
         require(
             waves is None,
-            "waves are those of modes = 'serpenoid'",
-            instead="add that, or drop waves",
+            "waves apply only to modes = 'serpenoid'",
+            instead="add modes = 'serpenoid', or remove waves",
         )
         return None
     if isinstance(modes, str):
@@ -38,8 +38,8 @@ def checked_modes(
     else:
         require(
             waves is None,
-            "waves are those of modes = 'serpenoid'",
-            instead="drop waves, or the rows of modes",
+            "waves apply only to modes = 'serpenoid'",
+            instead="remove waves, or replace the rows of modes",
         )
         modes = tuple(map(tuple, _checked_rows(modes, links - 1).tolist()))
     _require_independent(mode_rows(modes, waves, links))
@@ -64,7 +64,7 @@ def _checked_rows(modes, joints: int) -> np.ndarray:
     has_shape = array.ndim == 2 and len(array) > 0 and array.shape[1] == joints
     require(
         has_shape,
-        f"modes must be rows of {joints} joint angles, one row a mode",
+        f"modes must be rows of {joints} joint angles, with one row per mode",
         value=modes,
     )
     require(
@@ -87,12 +87,12 @@ def _require_independent(rows: np.ndarray) -> None:
         raise Refusal(
             f"mode {size.argmin() + 1} is zero",
             because="it moves no joint",
-            instead="drop it",
+            instead="remove it",
         )
     singular = np.linalg.svd(rows / size[:, None], compute_uv=False)
     require(
         singular[-1] > DEPENDENT * singular[0],
         f"the {count} modes are linearly dependent",
-        because="one is made of the others",
-        instead="drop it or change waves",
+        because="one is a combination of the others",
+        instead="remove it, or change waves",
     )

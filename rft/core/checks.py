@@ -82,7 +82,7 @@ def real_array(name: str, x: ArrayLike) -> np.ndarray:
             return array.astype(float, copy=False)
     except (TypeError, ValueError, OverflowError):
         pass
-    raise Refusal(f"{name} must be real numbers in equal rows", value=x)
+    raise Refusal(f"{name} must be an array of real numbers", value=x)
 
 
 def refuse_mask(name: str, x: object) -> None:
@@ -96,7 +96,7 @@ def refuse_mask(name: str, x: object) -> None:
         if isinstance(row, ma.MaskedArray) and ma.is_masked(row):
             raise Refusal(
                 f"{name} has masked values",
-                instead="leave them out, or fill them with nan where nan is taken",
+                instead="remove them, or replace them by nan where nan is allowed",
             )
 
 
@@ -169,7 +169,7 @@ def checked_covariance(value, *sizes: int) -> tuple[tuple[float, ...], ...] | No
         is_symmetric
         and bool(np.linalg.eigvalsh(correlation)[0] >= -1e-9)
         and bool((matrix[:, deviation == 0] == 0).all()),
-        "covariance must be symmetric and without negative eigenvalues",
+        "covariance must be symmetric, without negative eigenvalues",
         value=value,
     )
     return tuple(tuple(row) for row in matrix.tolist())

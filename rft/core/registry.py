@@ -85,18 +85,18 @@ class Registry(Mapping[str, Any]):
 
     def put(self, part: Any, name: object) -> None:
         """Add a part under a name; ValueError as `register`."""
-        who = f"{self.noun} of one's own, {getattr(part, '__name__', name)},"
+        who = f"{self.noun} of your own, {getattr(part, '__name__', name)},"
         if isinstance(part, type):
             parameters = getattr(part, "__dataclass_params__", None)
             if parameters is None or not parameters.frozen:
                 raise Refusal(
-                    f"{who} must be a value",
+                    f"{who} must be a frozen dataclass",
                     instead="put @dataclass(frozen=True) above it",
                 )
             if self.key in {f.name for f in dataclasses.fields(part)}:
                 raise Refusal(
-                    f"{who} has {self.key} as a parameter",
-                    instead=f"write {self.key} = {name!r} without a type",
+                    f"{who} has {self.key} as a field",
+                    instead=f"write {self.key} = {name!r} without a type annotation",
                 )
         given = self.key in getattr(part, "__dict__", {}) or name in self
         if (
@@ -111,13 +111,13 @@ class Registry(Mapping[str, Any]):
         if place(registered) != place(part):
             if name in self.built_in:
                 raise Refusal(
-                    f"{who} is named {name!r}, as one that is built in",
+                    f"{who} has the name {name!r} of a built-in part",
                     instead="give it another name",
                 )
             module, other = place(registered)
             raise Refusal(
-                f"{who} is named {name!r}, as the {other} of {module}",
-                instead="rename one",
+                f"{who} has the name {name!r} of the {other} in {module}",
+                instead="rename one of them",
             )
         self._parts[name] = part
 

@@ -19,10 +19,10 @@ from rft.effects.contact import Problem
 
 # Engines and what they solve, the cheapest first.
 ENGINES = {
-    "algebraic": "the balance of forces at every shape, all shapes at once",
+    "algebraic": "the force balance, at all shapes together",
     "time stepping": "the balance of forces step after step through the gait, place "
     "and past carried along",
-    "dynamic": "the equation of motion phase after phase, implicit in time",
+    "dynamic": "the equation of motion, phase after phase, implicit in time",
 }
 PAST = Premise.MEMORYLESS | Premise.QUASI_STATIC
 
@@ -141,7 +141,7 @@ class Effect:
             given = getattr(self, name)
             left_out = given is None or given is defaults[name]
             cure = (
-                f"give {name}, in body lengths, or {other.name} of a body with a "
+                f"give {name} in body lengths, or {other.name} for a body with a "
                 "length in m"
             )
             if getattr(self, other.name) is not None:
@@ -176,8 +176,8 @@ class Effect:
                         f"{name} = {largest:.6g} is in {number.unit}",
                         where=self.kind,
                         because=f"the body has a length, {length:g} m",
-                        instead=f"give {other.name}, {largest:.6g} if that is "
-                        f"{other.unit}, {scaled:.6g} if not",
+                        instead=f"give {other.name} instead: {largest:.6g} if the "
+                        f"value is in {other.unit}, otherwise {scaled:.6g}",
                     )
                 continue
             if length is None:
@@ -185,11 +185,13 @@ class Effect:
                     other.name,
                     where=self.kind,
                     because="the body has no length",
-                    instead=f"give it one, in m, or {name} in {number.unit}",
+                    instead=(
+                        f"give the body a length in m, or give {name} in {number.unit}"
+                    ),
                 )
             values[other.name] = None
             values[name] = in_metres / length**other.power
-            with located(f"{self.kind} {other.name} of a body of {length:g} m"):
+            with located(f"{self.kind} {other.name} on a body of {length:g} m"):
                 for x in (np.min(values[name]), np.max(values[name])):
                     in_range(name, float(x), number.low, number.high, unit=number.unit)
         return self.with_parameters(**values)

@@ -41,7 +41,12 @@ class BodyInertia(Effect):
     mass: Annotated[float, Number(0, 1e9, "kg", "mass of the body")]
     frequency: Annotated[
         float,
-        Number(0, 1e4, "1/s", "cycles per second, alphadot being per radian of phase"),
+        Number(
+            0,
+            1e4,
+            "1/s",
+            "cycles per second; the gait gives alphadot per radian of phase",
+        ),
     ]
     length: Annotated[float, Number(1e-9, 1e6, "m", "length of the body")]
     drag: Annotated[
@@ -50,7 +55,7 @@ class BodyInertia(Effect):
             1e-12,
             1e12,
             "N",
-            "drag on the straight body along itself, 2 k rho g r |z| L by Eq. 2",
+            "drag on the straight body along its axis, 2 k rho g r |z| L (Eq. 2)",
         ),
     ]
 
@@ -58,7 +63,8 @@ class BodyInertia(Effect):
     breaks = Premise.QUASI_STATIC | Premise.RATE_INDEPENDENT
     limit = "mass = 0"
     cost = (
-        "a step at a time in place of all phases at once; a dozen operations a sample"
+        "phases solved one after another instead of all at once, and a dozen "
+        "operations per sample"
     )
     batched = ("mass", "frequency", "length", "drag")
 
@@ -67,7 +73,7 @@ class BodyInertia(Effect):
         require(
             self.inertia <= 1000000.0,
             f"inertia is {self.inertia:.3g} times the axial drag",
-            because="beyond 1e6 no gait settles",
+            because="beyond 1e6 no gait becomes periodic",
         )
 
     @property

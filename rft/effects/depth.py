@@ -20,8 +20,8 @@ class DepthProfile(Effect):
     """Drag in proportion to depth, 2 k rho g r |z| of Eq. 2; depths are over the
     reference depth of the medium's drag.
 
-    along (-): |z| over that depth at equally spaced places from tail to head, linear
-    between them; [1, 1] is level.
+    along (-): |z| over the reference depth at equally spaced places from tail to head,
+    linear between them; [1, 1] is level.
 
     Each piece of the body has the depth of its centre. With a slope, drag depends on
     place and heading.
@@ -43,7 +43,7 @@ class DepthProfile(Effect):
             0,
             1000,
             "per body length",
-            "rise of |z| over that depth along the ground; or slope_per_m",
+            "rise of |z| over the reference depth along the ground; or slope_per_m",
         ),
     ] = 0.0
     towards: Annotated[
@@ -52,12 +52,12 @@ class DepthProfile(Effect):
             -1e6,
             1e6,
             "rad",
-            "direction of the rise, from the frame's heading at the start",
+            "direction of the rise, from the heading of the frame at the start",
         ),
     ] = 0.0
     slope_per_m: Annotated[
         float | None,
-        Number(0, 1e9, "per m", "slope under a body with a length, in place of slope"),
+        Number(0, 1e9, "per m", "slope under a body with a length, instead of slope"),
     ] = None
 
     kind = "depth-profile"
@@ -65,8 +65,8 @@ class DepthProfile(Effect):
     odd = True
     limit = "along all 1 and slope = 0"
     cost = (
-        "one multiplication an element; with a slope, a step at a time in place of all "
-        "phases at once"
+        "one multiplication per element; with a slope also phases solved one after "
+        "another instead of all at once"
     )
     batched = ("slope", "towards", "slope_per_m")
     varies_along = True
@@ -77,7 +77,7 @@ class DepthProfile(Effect):
             along.ndim == 1
             and along.size >= 2
             and bool(((along > 0) & (along <= 1000)).all()),
-            "along must be two depths or more, over the reference depth, > 0 to 1000",
+            "along must be two or more depths over the reference depth, > 0 to 1000",
             value=self.along,
         )
         object.__setattr__(self, "along", tuple(along.tolist()))
@@ -114,7 +114,7 @@ class DepthProfile(Effect):
         depth = level + self.slope * distance
         if not (depth > 0).all(where=contact.buried > 0):
             raise Refusal(
-                "the body comes to the surface",
+                "the body reaches the surface",
                 instead="lower the slope of the depth profile, or run fewer cycles",
             )
         return depth

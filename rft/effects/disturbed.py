@@ -64,7 +64,7 @@ class DisturbedGround(Effect):
     ] = None
     radius_m: Annotated[
         float | None,
-        Number(0, 1e6, "m", "radius for a body with a length, in place of radius"),
+        Number(0, 1e6, "m", "radius for a body with a length, instead of radius"),
     ] = None
 
     kind = "disturbed-ground"
@@ -72,7 +72,10 @@ class DisturbedGround(Effect):
     required = ("weakening",)
     breaks = Premise.MEMORYLESS
     limit = "weakening = 0"
-    cost = "a map of the ground, two look-ups and some thirty marks an element and step"
+    cost = (
+        "a map of the ground, with two look-ups and about thirty marks per element "
+        "and step"
+    )
     batched = ("weakening",)
     varies_along = True
     drift_tolerance = 1e-3  # the map has cells, and no two cycles meet them alike

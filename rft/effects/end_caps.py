@@ -54,12 +54,13 @@ class EndCaps(Effect):
             0,
             100,
             "-",
-            "q of the axial force: sin gamma0 if not given, 1 for one as cos psi",
+            "q of the axial force: sin gamma0 if left out, 1 for a force "
+            "proportional to cos psi",
         ),
     ] = None
     radius_m: Annotated[
         float | None,
-        Number(0, 1e6, "m", "radius of a body with a length, in place of radius"),
+        Number(0, 1e6, "m", "radius of a body with a length, instead of radius"),
     ] = None
 
     kind = "end-caps"
@@ -67,7 +68,7 @@ class EndCaps(Effect):
     metres = {"radius": InMetres("radius_m")}
     adds_points = odd = True
     limit = "radius = 0"
-    cost = "one point load an end"
+    cost = "one point load per end"
 
     def __post_init__(self):
         check_numbers(self)
@@ -76,7 +77,7 @@ class EndCaps(Effect):
     def check(self, medium: Any) -> None:
         require(
             isinstance(medium, Granular),
-            f"end caps take a granular medium, got {type(medium).__name__}",
+            f"end caps need a granular medium, got {type(medium).__name__}",
         )
 
     def apply(self, problem: Problem, site: Any = None, state: Any = None) -> Problem:
@@ -98,8 +99,8 @@ class EndCaps(Effect):
         in body lengths."""
         require(
             self.radius is not None,
-            "the traction of end caps takes their radius in body lengths",
-            instead="say ``in_body_lengths`` with the body's length",
+            "the traction of end caps needs their radius in body lengths",
+            instead="use ``in_body_lengths`` with the length of the body",
         )
         v_t = unmasked("v", v_t)
         v_n = unmasked("v", v_n)

@@ -44,14 +44,21 @@ class GrainInertia(Effect):
 
     frequency: Annotated[
         float,
-        Number(0, 1e4, "1/s", "cycles per second, alphadot being per radian of phase"),
+        Number(
+            0,
+            1e4,
+            "1/s",
+            "cycles per second; the gait gives alphadot per radian of phase",
+        ),
     ]
     length: Annotated[float, Number(1e-9, 1e6, "m", "length of the body")]
     depth: Annotated[float, Number(1e-9, 1e6, "m", "depth |z|")]
-    strength: Annotated[float, Number(0, 1e6, "-", "lambda; 1 is assumed")] = 1.0
+    strength: Annotated[
+        float, Number(0, 1e6, "-", "lambda; the default 1 is assumed")
+    ] = 1.0
     k: Annotated[
         float | None,
-        Number(1e-3, 1e3, "-", "factor of Eq. 2, in place of the medium's own"),
+        Number(1e-3, 1e3, "-", "factor of Eq. 2, instead of the medium's"),
     ] = None
 
     kind = "grain-inertia"
@@ -60,7 +67,7 @@ class GrainInertia(Effect):
     breaks = Premise.RATE_INDEPENDENT
     limit = "frequency = 0"
     order = 2  # of strength = 0 it is 1
-    cost = "a dozen operations an element"
+    cost = "a dozen operations per element"
     batched = ("frequency", "length", "depth", "strength", "k")
 
     def __post_init__(self):
@@ -74,13 +81,13 @@ class GrainInertia(Effect):
 
     def assumes(self, medium: Any) -> str:
         if self._given_k(medium) is None:
-            return f"k = {ASSUMED_K:g}, that of loose glass"
+            return f"k = {ASSUMED_K:g}, the value for loose glass"
         return ""
 
     def check(self, medium: Any) -> None:
         require(
             not is_linear(medium),
-            f"grain inertia takes a medium of grains, got {type(medium).__name__}",
+            f"grain inertia needs a granular medium, got {type(medium).__name__}",
         )
 
     def apply(self, problem: Problem, site: Any = None, state: Any = None) -> Problem:

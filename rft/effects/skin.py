@@ -34,15 +34,11 @@ class SkinFriction(Effect):
 
     forward: Annotated[
         float,
-        Number(
-            1e-3, 100, "-", "coefficient of friction with the grains towards the head"
-        ),
+        Number(1e-3, 100, "-", "coefficient of friction when sliding towards the head"),
     ] = 0.109
     backward: Annotated[
         float,
-        Number(
-            1e-3, 100, "-", "coefficient of friction with the grains towards the tail"
-        ),
+        Number(1e-3, 100, "-", "coefficient of friction when sliding towards the tail"),
     ] = 0.137
     reference: Annotated[
         float,
@@ -54,7 +50,7 @@ class SkinFriction(Effect):
     kind = "skin-friction"
     mixes_media = True
     limit = "forward = backward = reference"
-    cost = "one multiplication an element"
+    cost = "one multiplication per element"
     batched = ("forward", "backward", "reference")
 
     def __post_init__(self):

@@ -57,13 +57,16 @@ class Slope(Effect):
             -1e6,
             1e6,
             "rad",
-            "direction of the rise, from the frame's heading at the start",
+            "direction of the rise, from the heading of the frame at the start",
         ),
     ] = 0.0
     repose: Annotated[
         float,
         Number(
-            0.01, 1.5, "rad", "angle at which the ground slides by itself, above angle"
+            0.01,
+            1.5,
+            "rad",
+            "angle of repose, at which the ground slides by itself; must exceed angle",
         ),
     ] = REPOSE
     weight: Annotated[
@@ -72,7 +75,7 @@ class Slope(Effect):
             0,
             1e6,
             "-",
-            "weight of the body over the drag on it, straight, along itself",
+            "weight of the body over its axial drag when straight",
         ),
     ] = 0.0
 
@@ -80,8 +83,8 @@ class Slope(Effect):
     breaks = Premise.SE2_SYMMETRIC
     limit = "angle = 0"
     cost = (
-        "two dozen operations an element; a step at a time in place of all phases at "
-        "once"
+        "two dozen operations per element, and phases solved one after another "
+        "instead of all at once"
     )
     batched = ("angle", "towards", "repose", "weight")
     varies_along = True
@@ -101,22 +104,22 @@ class Slope(Effect):
             pull < drag,
             "a body of this weight slides down",
             because=f"its pull along the slope, {pull:.3g} of the drag on level "
-            f"ground, must be below the drag downhill, {drag:.3g}",
+            f"ground, must be less than the drag downhill, {drag:.3g}",
         )
 
     def check(self, medium: Any) -> None:
         require(
             not is_linear(medium),
-            f"a slope takes a medium of grains, got {type(medium).__name__}",
+            f"a slope needs a granular medium, got {type(medium).__name__}",
         )
 
     def assumes(self, medium: Any) -> str:
-        weaker = "that only what moves downhill meets weaker ground"
+        weaker = "weaker ground only where an element moves downhill"
         if not np.all(self.repose == REPOSE):
             return weaker
         return (
             f"an angle of repose of {math.degrees(REPOSE):.1f} degrees, from half the "
-            f"drag downhill at 20, and {weaker}"
+            f"drag downhill at 20 degrees, and {weaker}"
         )
 
     def apply(self, problem: Problem, site: Site, state: Any = None) -> Problem:

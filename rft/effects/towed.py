@@ -41,7 +41,7 @@ class TowedSled(Effect):
             0,
             1000,
             "-",
-            "friction of the sled over the drag on the straight body along itself",
+            "friction of the sled over the axial drag of the straight body",
         ),
     ]
     distance: Annotated[
@@ -52,7 +52,7 @@ class TowedSled(Effect):
     ] = 0.0
     distance_m: Annotated[
         float | None,
-        Number(0, 1e6, "m", "distance for a body with a length, in place of distance"),
+        Number(0, 1e6, "m", "distance for a body with a length, instead of distance"),
     ] = None
 
     kind = "towed-sled"
@@ -71,8 +71,8 @@ class TowedSled(Effect):
         name = type(medium).__name__
         require(
             speed_exponent(medium) == 0,
-            "a towed sled takes a medium without viscous drag, dry as itself, "
-            f"got {name}",
+            "a towed sled needs a medium without viscous drag, because its own "
+            f"friction is dry, got {name}",
         )
 
     def apply(self, problem: Problem, site: Any = None, state: Any = None) -> Problem:

@@ -31,8 +31,8 @@ RATIO = 0.28  # +- 0.02
 @EFFECTS.register
 @dataclass(frozen=True)
 class Transient(Effect):
-    """Drag that comes back after a reversal: a share of it is there at once, the rest
-    over some travel.
+    """Drag that recovers after a reversal: a share of it acts at once, and the rest
+    recovers over a distance.
 
     Each element has a mean direction m, -1 to 1, of its travel x so far across the
     body, positive to the left, in which older travel counts exponentially less: dm/dx =
@@ -66,21 +66,21 @@ class Transient(Effect):
             0,
             10,
             "body lengths",
-            "travel over which 95 % of the drag across comes back; or travel_m",
+            "distance over which 95 % of the drag across recovers; or travel_m",
         ),
     ] = None
     at_once: Annotated[
-        float, Number(0, 1, "-", "share of the drag across that is there at once")
+        float, Number(0, 1, "-", "share of the drag across that acts at once")
     ] = AT_ONCE
-    ratio: Annotated[float, Number(0, 10, "-", "travel along over travel across")] = (
-        RATIO
-    )
+    ratio: Annotated[
+        float, Number(0, 10, "-", "distance of recovery along over the distance across")
+    ] = RATIO
     at_once_along: Annotated[
-        float, Number(0, 1, "-", "share of the drag along that is there at once")
+        float, Number(0, 1, "-", "share of the drag along that acts at once")
     ] = AT_ONCE_ALONG
     travel_m: Annotated[
         float | None,
-        Number(0, 1e6, "m", "travel for a body with a length, in place of travel"),
+        Number(0, 1e6, "m", "travel for a body with a length, instead of travel"),
     ] = None
 
     kind = "transient"
@@ -88,7 +88,8 @@ class Transient(Effect):
     breaks = Premise.MEMORYLESS
     limit = "travel = 0"
     cost = (
-        "two directions an element, one link integral more where its pivot lies inside"
+        "two directions per element, and one more link integral where its pivot "
+        "lies inside"
     )
     batched = ("travel", "at_once", "ratio", "at_once_along", "travel_m")
     memory_bounds = (-1.0, 1.0)

@@ -129,7 +129,7 @@ def fit_stress(beta, gamma, alpha_x, alpha_z) -> StressFit:
     zeta, misfit = _generic(design, y)
     _check_mistakes(rows, misfit)
     check_strength(
-        zeta, "angles in degrees, stresses in N/cm^3 (1e-6 of those in N/m^3)"
+        zeta, "angles in degrees, stresses in N/cm^3 (1e-6 of the value in N/m^3)"
     )
     unit = GENERIC / np.linalg.norm(GENERIC)
     prior = (np.eye(len(unit)) - np.outer(unit, unit)) / (SPREAD * zeta)
@@ -156,11 +156,11 @@ def fit_zeta(depth, force, area) -> ZetaFit:
     area = np.atleast_1d(real_array("area", area))
     require(
         depth.ndim == 1 and depth.shape == force.shape,
-        "depth and force must be equally many numbers",
+        "depth and force must have the same length",
     )
     require(
         area.shape in ((1,), depth.shape),
-        "area must be one number, or as many as depths",
+        "area must be one number, or one for each depth",
     )
     within = all(bool((np.abs(x) <= LARGEST).all()) for x in (depth, force, area))
     require(
@@ -183,7 +183,7 @@ def fit_zeta(depth, force, area) -> ZetaFit:
     zeta = float(per_zeta @ f / (per_zeta @ per_zeta))
     require(
         zeta > 0,
-        "the force is against the law",
+        "the force has the wrong sign for the law",
         because="it must be positive where grains push the plate upwards",
     )
     check_strength(zeta, "depth in m, force in N, area in m^2")
@@ -209,7 +209,7 @@ def check_strength(zeta: float, units: str) -> None:
     low, high = STRENGTHS
     require(
         low <= zeta <= high,
-        f"zeta = {zeta:.3g} is that of no grains ({low:g} to {high:g}): "
+        f"zeta = {zeta:.3g} is outside the range of grains ({low:g} to {high:g}): "
         f"check the units, {units}",
     )
 
@@ -221,7 +221,7 @@ def _drags(beta, gamma, alpha_x, alpha_z) -> np.ndarray:
     rows = [np.atleast_1d(real_array(name, x)) for name, x in columns.items()]
     require(
         all(x.shape == (rows[0].size,) for x in rows),
-        "beta, gamma, alpha_x and alpha_z must be equally many numbers",
+        "beta, gamma, alpha_x and alpha_z must have the same length",
     )
     rows = np.stack(rows)
     require(
@@ -261,27 +261,27 @@ def _generic(design, y) -> tuple[float, float]:
 # Slips of columns, signs and angles, and the rows (beta, gamma, alpha_x, alpha_z) that
 # were meant.
 MISTAKES = {
-    "alpha_x and alpha_z are swapped": lambda b, g, x, z: (b, g, z, x),
-    "beta and gamma are swapped": lambda b, g, x, z: (g, b, x, z),
-    "alpha_x has the other sign: positive is against the motion's x": (
+    "alpha_x and alpha_z were swapped": lambda b, g, x, z: (b, g, z, x),
+    "beta and gamma were swapped": lambda b, g, x, z: (g, b, x, z),
+    "alpha_x had the opposite sign (positive against the motion's x)": (
         lambda b, g, x, z: (b, g, -x, z)
     ),
-    "alpha_z has the other sign: positive is upwards": (
+    "alpha_z had the opposite sign (positive upwards)": (
         lambda b, g, x, z: (b, g, x, -z)
     ),
-    "both stresses have the other sign: they are those on the plate": (
+    "both stresses had the opposite sign (they act on the plate)": (
         lambda b, g, x, z: (b, g, -x, -z)
     ),
-    "gamma has the other sign: positive is below the horizontal": (
+    "gamma had the opposite sign (positive below the horizontal)": (
         lambda b, g, x, z: (b, -g, x, z)
     ),
-    "beta has the other sign: positive if the forward edge is up": (
+    "beta had the opposite sign (positive if the forward edge is up)": (
         lambda b, g, x, z: (-b, g, x, z)
     ),
-    "beta is from the vertical: 0 is a plate that lies flat": (
+    "beta were not measured from the vertical (0 is a plate that lies flat)": (
         lambda b, g, x, z: (np.pi / 2 - b, g, x, z)
     ),
-    "gamma is from the vertical: 90 degrees is straight down": (
+    "gamma were not measured from the vertical (90 degrees is straight down)": (
         lambda b, g, x, z: (b, np.pi / 2 - g, x, z)
     ),
 }
@@ -299,7 +299,8 @@ def _check_mistakes(rows, misfit: float) -> None:
     best = min(misfits, key=misfits.get)
     require(
         misfits[best] > misfit / 2,
-        f"these drags are like those of no grains, but would be if {best}",
+        f"these drags do not resemble those of any grains, but would if {best}: "
+        "check the columns",
     )
 
 

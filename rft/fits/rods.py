@@ -254,8 +254,8 @@ def fit(
     if data.ends is not None and end_caps:
         require(
             fits_caps,
-            "these are forces on the flank and on the ends",
-            instead="leave ``end_caps`` out or say 'fitted'",
+            "the file has forces on the flank and on the ends",
+            instead="leave ``end_caps`` out or use 'fitted'",
         )
         return _with_ends(fit(law, data, rod))
     names = (*fitted_law.names, "axial_force")
@@ -279,7 +279,7 @@ def fit(
     best = _best(residual, _starts(fitted_law, data, residual, fits_caps), low, high)
     require(
         best.success,
-        f"the fit of {', '.join(map(_with_unit, names))} does not settle",
+        f"the fit of {', '.join(map(_with_unit, names))} does not converge",
         instead="measure at more angles",
     )
     _check_inside(names, best.x, low, high)
@@ -315,17 +315,17 @@ def _check_end_caps(law: str, rod: Rod, end_caps: float | str) -> None:
     if end_caps:
         require(
             law == "granular",
-            f"end caps take the granular law, got {law}",
+            f"end caps need the granular law, got {law}",
             instead="leave them out",
         )
         require(
             rod.radius and rod.length,
-            "end caps take the rod's radius and length",
-            instead="give both, or leave the caps out",
+            "end caps need the radius and the length of the rod",
+            instead="give both, or leave the end caps out",
         )
         require(
             rod.radius <= rod.length,
-            f"end caps take a rod longer than its radius, got {rod.length:g} m",
+            f"end caps need a rod longer than its radius, got {rod.length:g} m",
         )
 
 
@@ -368,8 +368,8 @@ def _with_ends(flank: Fit) -> Fit:
     e = float(best.x[0])
     require(
         0 < e < MOST_CAPS,
-        f"the force on the ends is that of {e:.2g} flat ends",
-        because=f"e is 0 to {MOST_CAPS:g}",
+        f"the force on the ends corresponds to {e:.2g} flat ends",
+        because=f"e must be 0 to {MOST_CAPS:g}",
     )
     sizes = np.where(flank.errors > 0, flank.errors, np.abs(flank.values))
     slopes = []
@@ -496,9 +496,9 @@ def _check_inside(names, values, low, high) -> None:
         for bound in bounds:
             require(
                 abs(x - bound) > AT_BOUND * max(abs(bound), 1.0),
-                f"the fit ends at the edge of {_with_unit(name)}, "
+                f"the fit ends at the bound {_with_unit(name)} = "
                 f"{_degrees(name, bound):g}",
-                because="these data do not settle it",
+                because="these data do not determine it",
                 instead=cure,
             )
 
@@ -521,7 +521,7 @@ def _covariance(names, best, count: int) -> np.ndarray:
     _, s, right = np.linalg.svd(best.jac * size, full_matrices=False)
     if s[-1] < DEPENDENT * s[0]:
         raise Refusal(
-            f"these data do not tell {', '.join(map(_with_unit, names))} apart",
+            f"these data do not distinguish {', '.join(map(_with_unit, names))}",
             instead="measure at more angles",
         )
     root = (right.T / s) * size[:, None]

@@ -127,7 +127,7 @@ FUNCTIONS = (
     gather,
 )
 ALLOWED = (
-    "a formula takes + - * /, < <= > >= == joined by & and |, numbers of the law, "
-    "other formulas, and of rft.formulas.vectors "
+    "a formula may use + - * /, < <= > >= == joined by & and |, numbers of the law, "
+    "other formulas, and from rft.formulas.vectors "
     + ", ".join(function.__name__ for function in FUNCTIONS)
 )

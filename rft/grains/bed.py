@@ -83,19 +83,19 @@ class Bed:
             self.step <= RAYLEIGH_SHARE * self.rayleigh_time * (1 + 1e-9),
             f"a time step of {self.step:.3g} s is {share:.2f} of the Rayleigh time",
             because=f"contacts are resolved up to {RAYLEIGH_SHARE:g} of it",
-            instead=f"take {RAYLEIGH_SHARE * self.rayleigh_time:.2g} s or less, or "
+            instead=f"use {RAYLEIGH_SHARE * self.rayleigh_time:.2g} s or less, or "
             "softer grains",
         )
         narrow = min(self.length, self.width) / self.diameter
         require(
             narrow >= 6,
             f"a bed {narrow:.1f} grains wide is too small",
-            instead="take six grains or more",
+            instead="use six grains or more",
         )
         require(
             self.grains <= MOST_GRAINS,
             f"{self.grains:,} grains are too many",
-            instead="take a smaller bed",
+            instead="use a smaller bed",
         )
 
     @property

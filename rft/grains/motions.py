@@ -200,7 +200,8 @@ class Swim:
         shapes = self._shapes()
         require(
             shapes.shape[1:] == (body.joints,),
-            f"the gait has {shapes.shape[-1]} joint angles, and the body {body.joints}",
+            f"the gait has {shapes.shape[-1]} joint angles, but the body has "
+            f"{body.joints} joints",
         )
         body.require_clearance(shapes[::4])
 

@@ -86,8 +86,8 @@ def drags(run: Run, stroke: Stroke, half_width: float, bin_width: float) -> Drag
     sample = stroke.speed * (run.t[1] - run.t[0])
     require(
         path[-1] > amplitude,
-        "the body has not turned round",
-        instead="take a longer run",
+        "the body has not reversed its direction",
+        instead="use a longer run",
     )
 
     # Samples between reversals, and the force on each sphere against the motion.

@@ -180,8 +180,8 @@ class Spheres:
             require(
                 not bool((are_distant & (gap < 0)).any()),
                 f"links touch at the shape ({angles}) rad",
-                because="grains between them would have no room",
-                instead="take smaller joint angles or a thinner body",
+                because="grains have no space between them",
+                instead="use smaller joint angles or a thinner body",
             )
 
 
@@ -203,7 +203,7 @@ def chain(
     """
     _check_sizes(size=size, radius=radius)
     if not hasattr(skeleton, "motion"):
-        raise Refusal("a chain of spheres takes a body of rft.bodies", value=skeleton)
+        raise Refusal("a chain of spheres needs a body of rft.bodies", value=skeleton)
     zero = np.zeros((skeleton.joints, 1))
     half = size * skeleton.motion(zero, zero).half[:, 0]
     require(
@@ -277,7 +277,7 @@ def rod(
         require(
             shape == "round",
             f"a {shape} bar has no ends here",
-            instead="give through=True",
+            instead="use through=True",
         )
         return chain(Bar(), length, radius)
     outline = _outline(shape, radius, grain)
@@ -356,8 +356,8 @@ def _check_sizes(grain: float | None = None, **sizes: float) -> None:
         count = math.prod(value / grain for value in sizes.values())
         require(
             count <= MOST_SPHERES,
-            f"some {count:.0e} spheres are too many",
-            instead="take a larger ``grain``",
+            f"about {count:.0e} spheres are too many",
+            instead="use a larger ``grain``",
         )
 
 

@@ -272,7 +272,7 @@ def require_law(medium: Medium) -> None:
             f_t, f_n = medium.traction(np.ones((2, 3)), np.zeros((2, 3)), 1e-6)
     except TypeError as error:
         raise Refusal(
-            f"{name} must take (v_t, v_n, rounding=0.0) and return (f_t, f_n), "
+            f"{name} must accept (v_t, v_n, rounding=0.0) and return (f_t, f_n), "
             "rounding being the speed below which dry friction is rounded off",
             because=str(error),
         ) from error
@@ -319,7 +319,7 @@ def require_drag(medium: Medium) -> None:
     require(
         bool((cosine > 0).any()),
         f"{name} has no drag at any velocity",
-        instead="give its traction a positive one",
+        instead="its traction must be positive",
     )
     worst = np.unravel_index(np.argmin(cosine), cosine.shape)
     require(

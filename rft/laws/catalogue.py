@@ -52,7 +52,7 @@ SURFACE_ALONG_RANGE = (0.010, 0.017)  # assumed
 
 ZHANG_GOLDMAN = "Zhang and Goldman, Phys. Fluids 26, 101308 (2014)"
 FITTED = (
-    "f_n = C_S sin(atan(cot g0 sin psi)) + C_F sin psi, f_t = C_F cos psi fitted to "
+    "f_n = C_S sin(atan(cot g0 sin psi)) + C_F sin psi, f_t = C_F cos psi, fitted to "
     "rod drag at 7.62 cm depth, as written in third-party code; "
 )
 
@@ -81,8 +81,8 @@ CATALOGUE = {
             k=pressure_factor(5900.0, "close"),
         ),
         FITTED
-        + "C_S = 0.77, C_F = 0.59 (1e4 Pa), g0 = 12.21 degrees; that it is the close "
-        "packing is an inference",
+        + "C_S = 0.77, C_F = 0.59 (1e4 Pa), g0 = 12.21 degrees; the close packing is "
+        "inferred",
         5900.0,
     ),
     "glass-0.3mm-surface": Entry(
@@ -100,6 +100,6 @@ CATALOGUE = {
         "Gray and Hancock, J. Exp. Biol. 32, 802 (1955): slender-body limit, 2 : 1",
     ),
     "coulomb": Entry(
-        Coulomb(), "isotropic dry friction; a model, no measured constant"
+        Coulomb(), "isotropic dry friction; a model without a measured constant"
     ),
 }

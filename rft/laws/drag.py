@@ -121,13 +121,13 @@ def rod_drag(psi_deg, along, across, weight=None, ends=None) -> RodDrag:
     weight = real_array("weights", weight)
     require(
         along.shape == across.shape == weight.shape == (psi.size,),
-        "angles and forces must be rows of one length",
+        "angles and forces must have the same length",
     )
     forces = np.array([along, across])
     finite = all(bool(np.isfinite(x).all()) for x in (psi, forces, weight))
     require(
         finite and psi.size > 0,
-        "angles, forces and weights must be finite numbers, one at least",
+        "angles, forces and weights must be finite numbers, at least one of each",
     )
     require(
         bool((weight >= 0).all() and weight.any()),
@@ -169,7 +169,7 @@ def _opposing(psi: np.ndarray, forces: np.ndarray) -> np.ndarray:
     require(
         bool((forces > 0).any()),
         "no force is positive",
-        because="drag is, where it opposes the motion",
+        because="drag is positive where it opposes the motion",
         instead="change the sign",
     )
     opposing = max(_signs(psi) * forces, forces, key=lambda x: x.min())
@@ -178,8 +178,8 @@ def _opposing(psi: np.ndarray, forces: np.ndarray) -> np.ndarray:
     force = forces[component, row]
     require(
         opposing[component, row] >= -PUSHING * largest,
-        f"at psi = {psi[row]:g} degrees the force {direction} the rod is {force:g} N "
-        "and pushes",
+        f"at psi = {psi[row]:g} degrees the force {direction} the rod is {force:g} N, "
+        "which drives the motion",
         because="drag is positive where it opposes the motion",
     )
     return opposing
@@ -200,6 +200,6 @@ def _require_not_exchanged(data: RodDrag) -> None:
         misfit(directions[::-1]) >= 0.25 * as_given
         or as_given < 1e-06 * (data.forces**2).sum(),
         "the forces along the rod grow with psi and those across it fall",
-        because="the columns are exchanged, or psi is measured from the rod's normal",
-        instead="it is the angle between velocity and rod axis",
+        because="the columns are swapped, or psi is measured from the rod's normal",
+        instead="psi is the angle between the velocity and the axis of the rod",
     )

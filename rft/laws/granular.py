@@ -27,9 +27,9 @@ class Granular(TermLaw):
     k is part of the unit of force; only effects measured against the weight of grains
     use it (grain inertia).
 
-    covariance (-): of C and gamma0 (in rad), and of k as a third parameter if k is
-    given and has one; it changes no force and is what drag measurements leave open
-    (`rft.fits.rods`).
+    covariance (-): covariance of C and gamma0 (in rad), and of k as a third parameter
+    if k is given and uncertain. It changes no force; it is the uncertainty that drag
+    measurements leave (`rft.fits.rods`).
 
     Examples
     --------
@@ -39,16 +39,26 @@ class Granular(TermLaw):
     2.748
     """
 
-    C: Annotated[float, Number(0, 1e6, "-", "the extra normal force")]
+    C: Annotated[float, Number(0, 1e6, "-", "strength of the additional normal force")]
     gamma0: Annotated[
         float,
         Number(
-            -1e6, 1e6, "rad", "angle at which it saturates, strictly between 0 and pi/2"
+            -1e6,
+            1e6,
+            "rad",
+            "angle at which the additional force saturates, strictly between 0 "
+            "and pi/2",
         ),
     ]
     k: Annotated[
         float | None,
-        Number(1e-3, 1e3, "-", "pressure across over the weight of the grains above"),
+        Number(
+            1e-3,
+            1e3,
+            "-",
+            "pressure on the body moving across, over the weight of the grains above "
+            "it",
+        ),
     ] = None
     covariance: tuple[tuple[float, ...], ...] | None = None
     law = "granular"

@@ -25,8 +25,8 @@ class Surface(TermLaw):
     e51412, 2020) fitted to the drag on a plate; that of f_t, Coulomb friction, is
     assumed.
 
-    covariance (-): of C, gamma0 (in rad) and across; it changes no force and is what
-    drag measurements leave open.
+    covariance (-): covariance of C, gamma0 (in rad) and across. It changes no force; it
+    is the uncertainty that drag measurements leave.
 
     Examples
     --------
@@ -36,11 +36,15 @@ class Surface(TermLaw):
     2.748
     """
 
-    C: Annotated[float, Number(0, 1e6, "-", "the extra normal force")]
+    C: Annotated[float, Number(0, 1e6, "-", "strength of the additional normal force")]
     gamma0: Annotated[
         float,
         Number(
-            -1e6, 1e6, "rad", "angle at which it saturates, strictly between 0 and pi/2"
+            -1e6,
+            1e6,
+            "rad",
+            "angle at which the additional force saturates, strictly between 0 "
+            "and pi/2",
         ),
     ]
     across: Annotated[
@@ -49,7 +53,7 @@ class Surface(TermLaw):
             1e-6,
             1e6,
             "-",
-            "strength of the drag across, A of that fit, over the axial drag",
+            "strength of the drag across (A of the fit) over the axial drag",
         ),
     ]
     covariance: tuple[tuple[float, ...], ...] | None = None

@@ -37,10 +37,12 @@ class Table:
     """Rate-independent drag (f_t, f_n) measured at attack angles psi between velocity
     and body axis, in any one unit.
 
-    psi (rad): at least three different angles that come within 15 degrees of 0 and of
-    pi/2; other angles are mapped to 0 to pi/2 by symmetry, and forces at equal angles
-    averaged (`rft.laws.drag.rod_drag`). f_t, f_n (-): as many forces per length along
-    and across, in one unit of any kind, positive against the motion.
+    psi (rad): attack angles, at least three different ones, of which one lies within 15
+    degrees of 0 and one within 15 degrees of pi/2. Other angles are mapped to 0 to pi/2
+    by symmetry, and forces at equal angles are averaged (`rft.laws.drag.rod_drag`). f_t
+    (-): force per length along the body at each angle, positive against the motion, in
+    the same unit as f_n. f_n (-): force per length across the body at each angle,
+    positive against the motion, in the same unit as f_t.
 
     With the unit velocity v, f_t is a function of v.t = cos psi and f_n a function of
     v.n = sin psi, as in Eq. 3 of Zhang and Goldman (2014). Both are odd piecewise
@@ -74,7 +76,7 @@ class Table:
         require(
             psi.shape == f_t.shape == f_n.shape == (psi.size,)
             and 3 <= psi.size <= MOST_ROWS,
-            f"psi, f_t and f_n must be rows of 3 to {MOST_ROWS} numbers each",
+            f"psi, f_t and f_n must each have 3 to {MOST_ROWS} numbers",
         )
         for name, x in (("psi", psi), ("f_t", f_t), ("f_n", f_n)):
             require(bool(np.isfinite(x).all()), f"{name} must be finite numbers")
@@ -90,15 +92,15 @@ class Table:
             data.psi.min() <= LARGEST_GAP
             and data.psi.max() >= np.pi / 2 - LARGEST_GAP
             and (len(np.unique(data.psi.round(9))) > 2),
-            "the angles must come within 15 degrees of 0 and of 90, with at least one "
-            "more between",
+            "the angles must include one within 15 degrees of 0, one within 15 "
+            "degrees of 90, and at least one between them",
         )
         along = _monotone_curve(np.cos(data.psi), data.forces[0])
         across = _monotone_curve(np.sin(data.psi), data.forces[1])
         unit = float(along(1.0))
         if unit <= 0:
             unit = float(across(1.0))
-        require(unit > 0, "there is no drag at psi = 0 nor at psi = 90 degrees")
+        require(unit > 0, "there is no drag at psi = 0 or at psi = 90 degrees")
         numbers = {
             **_curve_arrays("along", along, unit),
             **_curve_arrays("across", across, unit),

@@ -19,8 +19,8 @@ class Viscous(TermLaw):
     A ratio of 2 is the slender-body limit of Gray and Hancock, J. Exp. Biol. 32, 802
     (1955).
 
-    covariance (-): of the ratio, 1 x 1; it changes no force and is what drag
-    measurements leave open (`rft.fits.rods`).
+    covariance (-): variance of the ratio, a 1 x 1 matrix. It changes no force; it is
+    the uncertainty that drag measurements leave (`rft.fits.rods`).
 
     Examples
     --------
@@ -29,7 +29,7 @@ class Viscous(TermLaw):
     [0.5, 1.0]
     """
 
-    ratio: Annotated[float, Number(1e-8, 1e8, "-", "normal over axial drag")] = 2.0
+    ratio: Annotated[float, Number(1e-8, 1e8, "-", "normal drag over axial drag")] = 2.0
     covariance: tuple[tuple[float, ...], ...] | None = None
     uncertain = ("ratio",)
     law = "viscous"

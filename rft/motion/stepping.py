@@ -119,10 +119,10 @@ class TimeSteps(NamedTuple):
             )
         if (self.status == "not periodic").any():
             raise RuntimeError(
-                f"after {self.cycles} cycles displacement is still "
-                f"{np.max(self.drift):.1e} body lengths from its limit: "
-                "give 'cycles' to take it as it is, or lower the mass, the ground's "
-                "weakening or the travel of a transient"
+                f"after {self.cycles} cycles the displacement still differs by "
+                f"{np.max(self.drift):.1e} body lengths from its limit: give 'cycles' "
+                "to accept it, or lower the mass, the ground's weakening or the "
+                "travel of a transient"
             )
         return self
 
@@ -183,7 +183,7 @@ def time_steps(
     check(backend)
     require(
         alpha.ndim >= 2 and alpha.shape[-2] >= 8,
-        f"time stepping takes 8 phases or more, got alpha {alpha.shape}",
+        f"time stepping needs 8 phases or more, got alpha {alpha.shape}",
     )
     if cycles is not None:
         in_range("cycles", cycles, 1, 10_000, whole=True)

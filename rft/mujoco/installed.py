@@ -252,7 +252,7 @@ def _set_callback(compiled: bool) -> None:
     require(
         present is None,
         "another passive callback is installed",
-        because="MuJoCo has one for all models",
+        because="MuJoCo has only one for all models",
         instead="mujoco.set_mjcb_passive(None)",
     )
     _active[:] = _compiled_callback() if compiled else [_python_callback]
@@ -361,8 +361,8 @@ def _warn_changed(bed: Bed, shapes: np.ndarray, before: np.ndarray) -> None:
     """Warn that a bed is detached because a geom has changed."""
     first = int(np.flatnonzero((shapes != before).any(1))[0])
     line = (
-        f"the sand is detached: the geom {bed.geoms.names[first]} changed after attach:"
-        " attach it anew"
+        f"the sand is detached: the geom {bed.geoms.names[first]} changed after "
+        "attach: attach it again"
     )
     warnings.warn(line, Note, stacklevel=2)
 
@@ -370,9 +370,9 @@ def _warn_changed(bed: Bed, shapes: np.ndarray, before: np.ndarray) -> None:
 def _warn_unsolved(time: float, residual: float, geom: str) -> None:
     """Warn about a step that is not solved."""
     line = (
-        f"the step at {time:.6g} s is not solved: the forces, of which the grains'"
-        f" on {geom} are the largest, miss balance by {100 * residual:.2g} %;"
-        " sand.effort counts such steps, shorter ones are easier"
+        f"the step at {time:.6g} s is not solved: its forces, the largest of which "
+        f"act on {geom}, are out of balance by {100 * residual:.2g} %; sand.effort "
+        "counts such steps, and shorter steps are easier"
     )
     warnings.warn(line, Note, stacklevel=2)
 

@@ -41,8 +41,8 @@ def law_of(medium: object) -> Extruded | Spatial:
     raise Refusal(
         "the medium has no vertical law in three dimensions",
         value=medium,
-        instead="give a name of rft.terradynamics.plates.VERTICAL, a StressMap or a"
-        " Spatial",
+        instead="use a name from rft.terradynamics.plates.VERTICAL, a StressMap or a "
+        "Spatial",
     )
 
 
@@ -50,7 +50,7 @@ def _require_vertical(name: str) -> None:
     """Raise Refusal for a name that is not in `VERTICAL`."""
     if name in VERTICAL:
         return
-    choices = f"take one of {', '.join(VERTICAL)}"
+    choices = f"use one of {', '.join(VERTICAL)}"
     if name in CATALOGUE:
         raise Refusal(f"{name} has no vertical law", instead=choices)
     near = difflib.get_close_matches(name, VERTICAL, 1, 0.5)
@@ -76,7 +76,7 @@ def sample(
     rng = np.random.default_rng(seed)
     if isinstance(medium, StressFit):
         require(
-            spread is None, "a fit has its own covariance", instead="drop ``spread``"
+            spread is None, "a fit has its own covariance", instead="remove ``spread``"
         )
 
         def draw(count: int) -> np.ndarray:
@@ -85,21 +85,21 @@ def sample(
         return _draw_maps(draw, n)
 
     if isinstance(medium, ZetaFit):
-        require(spread is None, "a fit has its own error", instead="drop ``spread``")
+        require(spread is None, "a fit has its own error", instead="remove ``spread``")
         spread = medium.error / medium.zeta
         medium = StressMap(zeta=medium.zeta)
     if isinstance(medium, str) and medium in VERTICAL:
         medium = VERTICAL[medium].stress
     require(
         isinstance(medium, StressMap | Spatial),
-        "the medium has no strength to draw",
+        "the medium has no strength that could vary",
         value=medium,
     )
     require(
         spread is not None,
         "the uncertainty of the medium is unknown",
-        instead="give ``spread``, the standard deviation of the logarithm of its"
-        " strength, or a fit with its covariance",
+        instead="give ``spread``, the standard deviation of the logarithm of the "
+        "strength, or a fit with its covariance",
     )
     in_range("spread", spread, 0, 2)
     strength = "zeta" if isinstance(medium, StressMap) else "xi_n"
@@ -120,7 +120,7 @@ def _draw_maps(draw: Callable[[int], np.ndarray], n: int) -> list[StressMap]:
         if len(maps) >= n:
             return maps[:n]
     raise Refusal(
-        "hardly any drawn map bears a plate",
+        "hardly any sampled map supports a plate",
         because="the covariance is larger than the coefficients",
     )
 
@@ -135,7 +135,7 @@ class Media(Sequence):
 
     def __init__(self, model: mujoco.MjModel, bed: Bed, media: Sequence[Any]):
         self._beds = [with_medium(bed, medium) for medium in media]
-        require_one_form(tuple(one.laws[0] for one in self._beds), "of one batch")
+        require_one_form(tuple(one.laws[0] for one in self._beds), "in one batch")
         self.models = [copy.copy(model) for _ in media]
         self._rows = [
             installed.install(own, bed) for own, bed in zip(self.models, self._beds)
@@ -164,8 +164,8 @@ class Media(Sequence):
         bed = with_medium(self._beds[i], medium)
         require(
             type(bed.laws[0]) is type(self._beds[i].laws[0]),
-            "media of one batch must have one form",
-            instead="make another batch",
+            "all media of a batch must have the same form",
+            instead="create another batch",
         )
         self._beds[i] = bed
         installed.replace_bed(self._rows[i], bed)
@@ -202,6 +202,6 @@ def require_one_form(
     dimensions."""
     require(
         len({type(law) for law in laws}) == 1,
-        f"media {owner} must have one form",
-        instead="give stress maps, or laws, alone",
+        f"media {owner} must have the same form",
+        instead="use only stress maps, or only laws",
     )

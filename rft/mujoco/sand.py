@@ -102,15 +102,16 @@ class Sand:
         raise Refusal(
             "a Sand cannot be pickled or copied",
             because="it belongs to a model of this process",
-            instead="attach it anew there",
+            instead="attach it again there",
         )
 
     def __repr__(self) -> str:
         state = "" if self.is_attached else ", detached"
-        within = "" if self.element else ", by which forces are within 3 %"
+        within = "" if self.element else ", which keeps forces within 3 %"
         return (
-            f"Sand({len(self.geoms)} geoms, {self.elements} elements{within}; rounding"
-            f" {self.rounding:.3g} m/s; error() tells that of a run{state})"
+            f"Sand({len(self.geoms)} geoms, {self.elements} elements{within}; "
+            f"rounding {self.rounding:.3g} m/s; error() returns the error of a "
+            f"run{state})"
         )
 
     @property
@@ -202,8 +203,8 @@ class Sand:
         prints = self._bed.prints
         require(
             prints is not None,
-            "the ground remembers nothing",
-            instead="give ``footprints`` to attach",
+            "the ground has no memory",
+            instead="pass ``footprints`` to attach",
         )
         userdata = getattr(data, "userdata", data)
         size = prints.userdata_size
@@ -243,7 +244,7 @@ class Sand:
         require(
             model is not None and self.is_attached,
             "the sand is detached",
-            instead="attach it anew",
+            instead="attach it again",
         )
         try:
             from mujoco.batch import Batch
@@ -280,23 +281,23 @@ class Sand:
         require(
             model is not None and self._row >= 0,
             "the sand is detached",
-            instead="attach it anew",
+            instead="attach it again",
         )
         require(
             self.is_attached,
-            "another passive callback took the place of the sand's",
-            instead="attach it anew",
+            "another passive callback replaced the callback of the sand",
+            instead="attach it again",
         )
         require(
             len(data.qvel) == model.nv and data.geom_xpos.shape[0] == model.ngeom,
-            "the data are of another model",
+            "the data belong to another model",
         )
         shapes = _shape_numbers(model, self._bed.geoms.ids)
         changed = np.flatnonzero((shapes != self._shapes).any(1))
         if changed.size:
             raise Refusal(
                 f"the geom {formatted(self.geoms[changed[0]])} changed after attach",
-                instead="detach the sand and attach it anew",
+                instead="detach the sand and attach it again",
             )
         return model
 
@@ -427,7 +428,7 @@ def _height_field(
     well."""
     if not isinstance(level, str):
         return FLAT, []
-    require(not slope, "a height field has slopes of its own", instead="drop ``slope``")
+    require(not slope, "a height field has its own slopes", instead="remove ``slope``")
     hills, geom = hills_of(model, level)
     return hills, [geom]
 
@@ -439,8 +440,8 @@ def _require_free(model: mujoco.MjModel, geoms: Sequence[int]) -> None:
     names = ", ".join(formatted(geom_name(model, g)) for g in taken[:3])
     require(
         not taken,
-        f"sand is attached to {names} already",
-        instead="detach it, or name other geoms",
+        f"sand is already attached to {names}",
+        instead="detach it, or choose other geoms",
     )
 
 
@@ -470,7 +471,7 @@ def with_footprints(
     others = any(other.userdata_size for other in installed.beds(model))
     require(
         not others,
-        "another sand under the model remembers",
+        "another sand in this model has a memory",
         instead="attach all geoms at once",
     )
     bed = replace(bed, prints=_prints(model, bed, footprints, hulls))
@@ -556,7 +557,7 @@ def _contact_note(
     subject = "the geom no longer touches"
     if len(geoms) > 1:
         subject = f"{len(geoms)} geoms no longer touch"
-    return f"{subject} the floor {names}, which lies in the surface of the sand"
+    return f"{subject} the floor {names}, which lies at the surface of the sand"
 
 
 def _size_note(model: mujoco.MjModel, bed: Bed) -> str:
@@ -567,9 +568,9 @@ def _size_note(model: mujoco.MjModel, bed: Bed) -> str:
         return ""
     largest = int(np.argmax(counts))
     return (
-        f"the sand has {counts.sum():,} elements, {counts[largest]:,} of them on the"
-        f" geom {geom_label(model, bed.geoms.ids[largest])}: steps take long; give "
-        "fewer geoms, or a longer element"
+        f"the sand has {counts.sum():,} elements, {counts[largest]:,} of them on the "
+        f"geom {geom_label(model, bed.geoms.ids[largest])}: steps will be slow; "
+        "choose fewer geoms, or a longer element"
     )
 
 
@@ -578,8 +579,8 @@ def _numpy_note() -> str:
     if installed.serves_compiled():
         return ""
     return (
-        f"sand by Python's callback, some {NUMPY_TIME_RATIO} times slower:"
-        " pip install 'geomech[fast]'"
+        f"the sand runs through a Python callback, about {NUMPY_TIME_RATIO} times "
+        "slower: pip install 'geomech[fast]'"
     )
 
 
@@ -590,5 +591,5 @@ def require_passive(model: mujoco.MjModel) -> None:
     require(
         not disabled,
         "passive forces are disabled in the model",
-        instead='drop <flag passive="disable"/>',
+        instead='remove <flag passive="disable"/>',
     )

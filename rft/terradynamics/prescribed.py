@@ -16,7 +16,13 @@ FARTHEST = 1e3  # m along the ground
 
 Samples = Annotated[
     int,
-    Number(2, MOST_SAMPLES, "-", "poses along the motion, 2 to 100,000", whole=True),
+    Number(
+        2,
+        MOST_SAMPLES,
+        "-",
+        "number of poses along the motion, 2 to 100,000",
+        whole=True,
+    ),
 ]
 Distance = Annotated[float, Number(1e-9, FARTHEST, "m", "length of the path")]
 Direction = Annotated[
@@ -51,13 +57,13 @@ class Motion:
         require(
             abs(self.rate) >= 1e-9,
             "rate must not be 0",
-            because="drag a body that does not turn",
+            because="use drag for a body that does not turn",
         )
         reaches_stop = (self.stop - self.start) * self.rate > 0
         require(
             reaches_stop,
-            "a rate from start to stop",
-            because="positive if stop > start, else negative",
+            "the rate must lead from start to stop",
+            because="positive if stop > start, otherwise negative",
         )
 
 
@@ -75,7 +81,7 @@ def require_path_length(t: tuple[float, ...]) -> None:
     """Raise ValueError unless a path has as many poses as it may have."""
     require(
         3 <= len(t) <= MOST_SAMPLES,
-        f"a path takes 3 to {MOST_SAMPLES} poses",
+        f"a path must have 3 to {MOST_SAMPLES} poses",
         value=len(t),
     )
 
@@ -84,4 +90,4 @@ def require_ascending(t: tuple[float, ...]) -> None:
     """Raise ValueError unless each time of a path is before the next."""
     late = np.flatnonzero(np.diff(t) <= 0)
     if late.size:
-        raise Refusal(f"t must ascend, but t = {t[late[0]]:g} is not before the next")
+        raise Refusal(f"t must increase, but t = {t[late[0]]:g} is not before the next")

@@ -234,7 +234,7 @@ REFUSED = [
     (lambda: checked(SMALL, ROD, Stroke(0.1, 0.0, None)), "amplitude must be a number"),
     (lambda: checked(SMALL, ROD, TOW, sample=0.2), "sample must be a number"),
     (lambda: checked(SMALL, LONG, TOW), "as long as its bed, 0.064 m"),
-    (lambda: checked(Bed(), ROD, CIRCLE), "2 joint angles, and the body 0"),
+    (lambda: checked(Bed(), ROD, CIRCLE), "2 joint angles, but the body has 0"),
     (lambda: checked(Bed(), uneven(), FOLDED), "links touch at the shape"),
     (lambda: rod(0.05, 4e-3, through=True, grain=1e-5), "2e.06 spheres are too many"),
     (lambda: rod(0.05, 4e-3, "square"), "a square bar has no ends here"),
@@ -254,7 +254,11 @@ def test_what_cannot_be_is_refused(build, said):
 
 @pytest.mark.parametrize(
     ("folder", "said"),
-    [("file", "File exists; take"), ("für", "takes no folder named"), ('a"', "quotes")],
+    [
+        ("file", "File exists; use"),
+        ("für", "does not accept the folder name"),
+        ('a"', "quotes"),
+    ],
 )
 def test_folders_that_keep_no_beds_are_refused(folder, said, tmp_path):
     (tmp_path / "file").write_text("")
@@ -331,7 +335,9 @@ def stopped(store, tmp_path, monkeypatch):
     def stop(fraction):
         if fraction > 0.5:
             signal.raise_signal(signal.SIGINT)
-            with pytest.raises(ValueError, match="another process computes the run"):
+            with pytest.raises(
+                ValueError, match="another process is computing the run"
+            ):
                 TOWED.run(tmp_path)
 
     with pytest.raises(KeyboardInterrupt):
@@ -389,7 +395,11 @@ WALLED = dataclasses.replace(SMALL, walled=True)
     ("bed", "tow", "said"),
     [
         (WALLED, Tow(0.4, 0.0), r"at 0\.\d+ s the body leaves the bed"),
-        (SMALL, Tow(1.0), r"moves 0\.0\d+ grains a step: .* move it more slowly"),
+        (
+            SMALL,
+            Tow(1.0),
+            r"moves 0\.0\d+ grain diameters per step: .* move it more slowly",
+        ),
     ],
 )
 def test_bodies_that_leave_or_move_too_fast_are_refused(bed, tow, said, store):

@@ -117,8 +117,11 @@ def test_a_polygon_has_straight_sides_and_no_jump_of_its_rates():
     ("make", "said"),
     [
         (lambda: Polygon(points=((0, 0), (1, 1))), "at least 3 shapes"),
-        (lambda: Fourier(cos=((1.0,), (1.0, 2.0)), sin=((1.0,),)), "equal rows"),
-        (lambda: Points(points=((0, 0), (0, 0), (1, 1))), "neighbours distinct"),
+        (
+            lambda: Fourier(cos=((1.0,), (1.0, 2.0)), sin=((1.0,),)),
+            "array of real numbers",
+        ),
+        (lambda: Points(points=((0, 0), (0, 0), (1, 1))), "neighbours must differ"),
         (lambda: Butterfly().cycle(10), "at least 11 for this gait"),
     ],
 )

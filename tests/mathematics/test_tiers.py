@@ -91,11 +91,11 @@ GRID = connection.grid(2, 5)
     [
         (
             lambda f: family.fit(f, Circle(), 0.5, 6, 16).area([0.6]),
-            "from 0 to the family's 0.5",
+            "from 0 to the largest of the family, 0.5",
         ),
         (
             lambda f: family.fit(f, Circle(), 0.5, 6, 16, least=-0.5).area([-0.6]),
-            "must lie from -0.5 to the family's 0.5",
+            "must lie from -0.5 to the largest of the family, 0.5",
         ),
         (lambda f: family.fit(f, Circle(), 0.0), "largest amplitude"),
         (
@@ -105,7 +105,7 @@ GRID = connection.grid(2, 5)
         (lambda f: harmonics.fit(f, GRID, highest=5, count=5), "below the number of d"),
         (
             lambda f: cheapest_displacements(GLASS, [1.0], 1e-15),
-            "no tier gets to 1e-15 body lengths",
+            "no tier reaches 1e-15 body lengths",
         ),
         (lambda f: cheapest_displacements(GLASS, [1.0], 0.0), "tolerance must be"),
     ],

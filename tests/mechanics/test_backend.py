@@ -516,7 +516,7 @@ def test_damaged_code_is_set_aside_and_made_anew(damage, small):
     loaded()
     bad = DAMAGES[damage](file.path.read_bytes())
     file.path.write_bytes(bad)
-    with pytest.warns(Note, match="is not taken, it .*: renamed .*-m rft"):
+    with pytest.warns(Note, match="is not used because it .*: renamed to .*-m rft"):
         assert not loaded()
     assert loaded()
 
@@ -525,7 +525,9 @@ def test_code_that_cannot_be_kept_is_used_all_the_same(small):
     loaded, file = small
     full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     with mock.patch("rft.balance.cache.os.replace", side_effect=full):
-        with pytest.warns(Note, match="not kept in .*: No space left on device; make"):
+        with pytest.warns(
+            Note, match="not stored in .*: No space left on device; free"
+        ):
             assert not loaded()
         assert list(file.path.parent.iterdir()) == []
 
@@ -560,7 +562,7 @@ def test_a_command_outlives_the_cache(damage, tmp_path):
 
     if damage == "full disk":
         first, notes = run(50_000)
-        assert " is not kept in " in notes
+        assert " is not stored in " in notes
     else:
         first, _ = run()
         (file,) = (tmp_path / "cache").rglob("*.code")
@@ -646,7 +648,7 @@ def test_code_is_compiled_beforehand(capsys):
     from rft.balance.kernels import chain_kernel, kernel
 
     runpy.run_module("rft", run_name="__main__")
-    assert capsys.readouterr().out.startswith("compiled code is kept in ")
+    assert capsys.readouterr().out.startswith("compiled code is stored in ")
     for function in (kernel, chain_kernel, kernels_of):
         function.cache_clear()
     body_velocity(GLASS, BODY, (0.4, -0.7), (1.0, 0.3), backend="numba")

@@ -202,14 +202,14 @@ def test_end_caps():
 @pytest.mark.parametrize(
     ("law", "medium", "psi", "said"),
     [
-        ("granular", Coulomb(), PSI, "edge of C, 0"),
-        ("granular", Viscous(3.0), PSI, "edge of|apart|settle"),
-        ("granular", Granular(1.8, 5e-4), PSI, "edge of gamma0"),
+        ("granular", Coulomb(), PSI, "the bound C = 0"),
+        ("granular", Viscous(3.0), PSI, "the bound|distinguish|converge"),
+        ("granular", Granular(1.8, 5e-4), PSI, "the bound gamma0"),
         (
             "granular",
             Granular(1.8, 0.24),
             np.array([0.0, 90.0]),
-            "do not tell C, gamma0|edge of",
+            "do not distinguish C, gamma0|at the bound",
         ),
         (
             "granular",
@@ -217,7 +217,7 @@ def test_end_caps():
             np.array([30.0]),
             "2 forces are too few for C, gamma0",
         ),
-        ("viscous", Granular(1.8, 0.24), np.array([90.0]), "few|apart|edge"),
+        ("viscous", Granular(1.8, 0.24), np.array([90.0]), "few|distinguish|bound"),
     ],
 )
 def test_what_data_do_not_settle_is_refused(law, medium, psi, said):

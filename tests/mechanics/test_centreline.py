@@ -205,7 +205,7 @@ def test_equal_if_the_file_is(tmp_path):
     first = gait(write(tmp_path, "points"))
     assert first == gait(write(tmp_path, "points"))
     assert first != gait(write(tmp_path, "points", amplitude=0.12))  # the same path
-    with pytest.raises(ValueError, match="not the one whose sha256 is given"):
+    with pytest.raises(ValueError, match="does not match sha256"):
         dataclasses.replace(first, amplitude=0.5)
 
 
@@ -290,7 +290,7 @@ BAD = {  # what makes the file, options, and what is said
     "turned round": (
         edited("points", lambda t: [*t[:36], *t[36:48][::-1], *t[48:]]),
         {},
-        "t = 0.25 seems to run from head to tail",
+        "t = 0.25 appears to run from head to tail",
     ),
     "half": (edited("points", lambda t: t[:84]), {}, "the gait does not close"),
     "not closed": (
@@ -306,24 +306,24 @@ BAD = {  # what makes the file, options, and what is said
     "nearly": (
         edited("points", list, phases=[*PHASES * 0.985, 0.985]),
         {},
-        "all but repeats .*give period",
+        "almost repeats .*give period",
     ),
     "same time": (
         edited("points", list, phases=[*PHASES, 1e-9]),
         {"period": 1.0},
-        "after t = 0 comes at almost the same",
+        "after t = 0 follows at almost the same",
     ),
     "two": (
         edited("points", lambda t: [*t, *later(t, 1.0)]),
         {},
-        "the body does the same again after 1 in t, 2 times in the period of 2: give the",
+        "the motion repeats after 1 in t, 2 times within the period of 2: give the",
     ),
     "two and repeated": (
         edited("numbered", lambda t: [*t, *later(t, 1.0), *later(t[:12], 2.0)]),
         {"period": 2.0},
-        "2 times in the",
+        "2 times within the",
     ),
-    "two and a half": (with_repeats(8, 1.5), {}, "2.5 times in the period of 2.5"),
+    "two and a half": (with_repeats(8, 1.5), {}, "2.5 times within the period of 2.5"),
     "one and a half": (
         with_repeats(8, 0.5),
         {},
@@ -332,7 +332,7 @@ BAD = {  # what makes the file, options, and what is said
     "one and a quarter": (
         with_repeats(16, 0.25),
         {},
-        "the frame at t = 1 repeats the first, and 3 more come",
+        "the frame at t = 1 repeats the first, and 3 more frames follow",
     ),
     "few elements": (
         POINTS,

@@ -159,7 +159,7 @@ GRAINS = 'kind = "grain-inertia"\nfrequency = {f}\nlength = 0.3\ndepth = 0.05\n'
 
 def test_a_body_that_comes_to_the_surface_is_refused():
     steep = SANDFISH.changed(effects=(DepthProfile(slope=10.0),))
-    with pytest.raises(ValueError, match="comes to the surface: lower the slope"):
+    with pytest.raises(ValueError, match="reaches the surface: lower the slope"):
         SceneTables(steep).poses("direct")
 
 

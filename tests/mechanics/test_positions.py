@@ -87,7 +87,11 @@ def test_parameters_of_a_function_are_keys_of_its_scene(tmp_path):
 @pytest.mark.parametrize(
     ("function", "given", "says"),
     [
-        (lambda alpha: [["x"] * 3] * 3, {}, "positions must be real numbers"),
+        (
+            lambda alpha: [["x"] * 3] * 3,
+            {},
+            "positions must be an array of real numbers",
+        ),
         (hinged, {"frame": "link-4"}, "frame must be 'mean' or 'link-1' ... 'link-3'"),
         (hinged, {"lengths": (1, -1, 1)}, "lengths must all be finite and > 0"),
     ],

@@ -116,7 +116,11 @@ def test_what_is_stopped_leaves_nothing_half_written(
     code, out, err, files = ended(name)
     assert calls
     assert (code, out) == (ends, "")
-    stored = {".out.partial"} if "the same command goes on from there" in err else set()
+    stored = (
+        {".out.partial"}
+        if "repeat the command to continue from there" in err
+        else set()
+    )
     assert files == stored and (not stored or how is interrupt)
     assert said in err
     assert err == "" or "error: " in err

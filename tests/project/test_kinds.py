@@ -100,7 +100,7 @@ def test_the_speed_matters_under_a_law_of_no_one_power(law):
     assert not is_rate_independent(law)
     swimmer = Swimmer(law, Chain())
     assert swimmer.traits.lacks == Premise.RATE_INDEPENDENT
-    with pytest.raises(ValueError, match="no one power of the speed: use the direct"):
+    with pytest.raises(ValueError, match="not a power of the speed: use the direct"):
         SceneTables(Scene(swimmer, Circle(), SMALL)).poses("path")
 
 
@@ -209,7 +209,7 @@ def test_an_edited_script_resumes_nothing(tmp_path):
         return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
 
     stopped = run(SCRIPT, "stop").stderr
-    assert stopped.endswith("the same command goes on from there\n")
+    assert stopped.endswith("repeat the command to continue from there\n")
     assert (tmp_path / ".kept").exists()
     doubled = run(SCRIPT.replace("1.0 * np", "2.0 * np")).stdout
     small, large = map(float, doubled.split())
@@ -274,7 +274,7 @@ def test_the_speed_does_not_matter_under_a_law_of_one_power(law):
 @pytest.mark.parametrize(
     ("traction", "said"),
     [
-        (lambda t, n: (t, n), r"traction must take \(v_t, v_n, rounding=0.0\)"),
+        (lambda t, n: (t, n), r"traction must accept \(v_t, v_n, rounding=0.0\)"),
         (
             lambda t, n, eps=0.0: (t, np.ones(5)),
             r"shape \(2, 3\), got \(2, 3\) and \(5,",
@@ -292,5 +292,5 @@ def test_a_traction_that_is_none_is_refused(traction, said):
 
 def test_a_part_need_not_be_registered_to_be_used_from_python():
     scene = Scene(Swimmer(Bare(Viscous(math.e)), Chain()), Circle(), SMALL)
-    with pytest.raises(Refusal, match="Bare is of no kind that a scene file can name"):
+    with pytest.raises(Refusal, match="Bare has no kind that a scene file can name"):
         toml(scene)

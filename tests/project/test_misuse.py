@@ -64,13 +64,13 @@ def test_angles_beyond_a_full_turn_are_noted_once_and_the_result_is_given(
     code, out, err = geomech(*args, cwd=scene(tmp_path, PLAIN + change))
     assert (code, err.count("\n")) == (0, 1)
     assert err.startswith(f"note: {said}")
-    assert "beyond a full turn, 2 pi: if that is in degrees" in err
+    assert "more than a full turn, 2 pi: if the value is in degrees" in err
     assert out
 
 
 def test_a_gamma0_below_a_degree_is_noted():
     small = PLAIN.replace("gamma0_deg = 13.8", "gamma0_deg = 0.24")
-    with pytest.warns(UnitWarning, match="0.24 is less than a degree"):
+    with pytest.warns(UnitWarning, match="0.24 is less than one degree"):
         scenes.parse(small)
 
 
@@ -87,7 +87,7 @@ def test_a_gamma0_below_a_degree_is_noted():
     ],
 )
 def test_from_python_units_are_warned_of_by_name(ask):
-    with pytest.warns(UnitWarning, match="a joint angle of .* rad is beyond a full"):
+    with pytest.warns(UnitWarning, match="a joint angle of .* rad is more than a full"):
         ask()
 
 
@@ -135,7 +135,9 @@ def test_a_gait_off_the_field_is_refused_by_every_command_alike(gait, tmp_path):
     folder = scene(tmp_path, PLAIN + gait)
     told = geomech("displacement", "s.toml", cwd=folder)
     assert told[:2] == (2, "")
-    assert "lies outside the field's -2.5 to 2.5: widen the extent" in told[2]
+    assert (
+        "lies outside the field, which covers -2.5 to 2.5: widen the extent" in told[2]
+    )
     assert geomech("ccf", "s.toml", "--plot", "c.png", cwd=folder) == told
     assert geomech("accuracy", "s.toml", cwd=folder) == told
 
@@ -216,18 +218,18 @@ def test_no_medium_of_ours_is_suspected(name):
         (
             "C = 1.8",
             "C = .8",
-            "(at line 3, column 5): 'C = .8', a number has a digit before its point",
+            "(at line 3, column 5): 'C = .8', a number needs a digit before its decimal point",
         ),
-        ("C = 1.8", "C = 1,8", "'C = 1,8', a number has a point, no comma"),
+        ("C = 1.8", "C = 1,8", "'C = 1,8', a number has a decimal point, not a comma"),
         (
             "C = 1.8",
             "C = 1.8 # yes\nk = 2 Pa",
-            "(at line 4, column 7): 'k = 2 Pa', a number has no unit",
+            "(at line 4, column 7): 'k = 2 Pa', write numbers without a unit",
         ),
         (
             "gamma0_deg = 13.8",
             "gamma0 = 13.8 deg",
-            "a number has no unit: a key that ends in _deg takes degrees",
+            "write numbers without a unit: a key that ends in _deg takes degrees",
         ),
         ("C = 1.8", "C: 1.8", "'C: 1.8', write KEY = VALUE"),
         ("C = 1.8", "C =", "give the key a value"),
@@ -235,15 +237,15 @@ def test_no_medium_of_ours_is_suspected(name):
         (
             "C = 1.8",
             'C = "big"',
-            "Expected `float`, got `str` - at `.C`: give a number in place of 'big'",
+            "Expected `float`, got `str` - at `.C`: give a number instead of 'big'",
         ),
-        ('"chain"', '"chain"\nlengths = [1, "1", 1]', "give a number in place of '1'"),
-        ('"chain"', '"chain"\nlengths = 3', "give a list in [ ] in place of 3"),
+        ('"chain"', '"chain"\nlengths = [1, "1", 1]', "give a number instead of '1'"),
+        ('"chain"', '"chain"\nlengths = 3', "give a list in [ ] instead of 3"),
         ('"circle"', '"circle"\nreverse = 1', "give true or false in place of 1"),
         (
             '"circle"',
             '"circle"\ncentre_deg = ["a", 1]',
-            "give a number in place of 'a'",
+            "give a number instead of 'a'",
         ),
         (
             '"circle"',

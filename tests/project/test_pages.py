@@ -26,7 +26,7 @@ SITE = ROOT / ".docs"
 PAGES = [
     README,
     CONTRIBUTING,
-    *sorted(p for p in SITE.rglob("*.md") if p.parent != SITE / "generated"),
+    *sorted(p for p in SITE.rglob("*.md") if SITE / "generated" not in p.parents),
 ]
 SHIPPED = {
     *names.scene_names(),

@@ -352,7 +352,7 @@ def two_joints(alpha, alphadot):
 def test_a_velocity_alone_is_one_of_two_joints():
     assert library.study(two_joints).scene.system.joints == 2
     assert library.study(three_joints, joints=3).scene.system.joints == 3
-    with pytest.raises(ValueError, match="takes 3 joints.*give joints = 3"):
+    with pytest.raises(ValueError, match="needs 3 joints.*give joints = 3"):
         library.study(three_joints)
 
 

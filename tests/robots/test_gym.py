@@ -93,5 +93,5 @@ def test_what_is_no_number_truncates_an_episode(count):
     seen, reward, ended, cut, info = env.step(actions[0] if count == 1 else actions)
     assert np.ravel(cut).tolist() == [True, False, False][:count]
     assert not np.any(ended) and np.isfinite([*np.ravel(seen), *np.ravel(reward)]).all()
-    assert np.ravel(info["reason"])[0] == "the action is no number"
+    assert np.ravel(info["reason"])[0] == "the action must be finite numbers"
     env.close()

@@ -156,7 +156,7 @@ HUGE = {
         '<asset><hfield name="h" nrow="90000" ncol="90000" size="1 1 1 1"/></asset>',
         "height fields have 8,100,000,000 nodes, more than",
     ),
-    "pipe": ('<include file="pipe"/>', "pipe is no ordinary file"),
+    "pipe": ('<include file="pipe"/>', "pipe is not an ordinary file"),
     "circle": ('<include file="cart.xml"/>', "cart.xml is included too deep"),
 }
 

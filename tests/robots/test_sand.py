@@ -729,22 +729,31 @@ REFUSED = [
     ({"geoms": "bal"}, "the model has no geom 'bal': did you mean 'ball'"),
     ({"geoms": ["ball", "leg*"]}, "the model has no geom 'leg"),
     ({"geoms": 5}, r"no geom is in group 5: groups are \[0\]"),
-    ({"geoms": "slab"}, "the geom 'slab' is a plane and has no inside: give a sphere"),
-    ({"geoms": "post"}, "the geom 'post' is fixed to the world: name geoms that move"),
+    (
+        {"geoms": "slab"},
+        "the geom 'slab' is a plane, which is not solid: choose a sphere",
+    ),
+    (
+        {"geoms": "post"},
+        "the geom 'post' is fixed to the world: choose geoms that move",
+    ),
     ({"medium": "poppy-seeds-lose"}, "no medium 'poppy-seeds-lose': did you mean"),
-    ({"medium": "glass-0.3mm-loose"}, "has no vertical law: take one of generic"),
+    ({"medium": "glass-0.3mm-loose"}, "has no vertical law: use one of generic"),
     ({"medium": rft.Granular(1.8, 0.2)}, "no vertical law in three dimensions"),
-    ({"medium": DRAGS}, "must be a StressMap, nine .* fit some to plate drags"),
+    ({"medium": DRAGS}, "must be a StressMap with nine .* fit one to plate drags"),
     ({"level": math.nan}, "level must be"),
     ({"level": "ball"}, "the geom 'ball' is a sphere"),
     ({"slope": 1.2}, "slides by itself"),
-    ({"regions": ["x > 1"]}, "regions must be media by their conditions"),
-    ({"regions": {"x > z": MAP}}, "no condition on x and y: write it like 'x > 0.5'"),
-    ({"regions": {"x > 1 or y > 1": MAP}}, "is no condition"),
-    ({"regions": {"x / 0 > 1": MAP}}, "is no condition"),
-    ({"regions": {"x > " + 3000 * "-" + "1": MAP}}, "is no condition"),
+    ({"regions": ["x > 1"]}, "regions must map conditions to media"),
+    (
+        {"regions": {"x > z": MAP}},
+        "not a condition on x and y: write a condition such as 'x > 0.5'",
+    ),
+    ({"regions": {"x > 1 or y > 1": MAP}}, "is not a condition"),
+    ({"regions": {"x / 0 > 1": MAP}}, "is not a condition"),
+    ({"regions": {"x > " + 3000 * "-" + "1": MAP}}, "is not a condition"),
     ({"regions": {" < ".join("1x" * 51): MAP}}, "101 boundaries, more than 100"),
-    ({"regions": {"x > 1": SPATIAL}}, "media of all regions must have one form"),
+    ({"regions": {"x > 1": SPATIAL}}, "media of all regions must have the same form"),
     ({"regions": {"x > 1": "poppy-seeds-lose"}}, "did you mean poppy-seeds-loose"),
     ({"footprints": 0.01}, "footprints must be rft.mujoco.Footprints"),
     (PRINTS, 'need 8015 numbers of userdata, .* has 0: write <size nuserdata="8015"/>'),
@@ -767,11 +776,11 @@ BLOCK = free('<geom type="box" size="0.1 0.1 0.1"/>')
 PAIRED = '<contact><pair geom1="floor" geom2="foot"/></contact>'
 UNFIT = {
     "nothing in the model can move": (lambda: model_of(FIXED), {}),
-    "a <pair> of <contact> makes 'floor' and 'foot' touch: drop it": (
+    "a <pair> of <contact> makes 'floor' and 'foot' touch: remove it": (
         lambda: model_of(FLOORED.format(""), more=PAIRED),
         {},
     ),
-    "no bit is free to tell the floor from other geoms: use fewer contypes": (
+    "no bit is left to distinguish the floor from other geoms: use fewer contypes": (
         lambda: model_of(FLOORED.format('contype="2147483647"')),
         {},
     ),
@@ -787,7 +796,7 @@ UNFIT = {
         lambda: hilly(RISE, 'euler="10 0 0"'),
         {"level": "hills"},
     ),
-    "a height field has slopes of its own: drop slope": (
+    "a height field has its own slopes: remove slope": (
         lambda: hilly(RISE),
         {"level": "hills", "slope": 0.1},
     ),
@@ -807,7 +816,7 @@ def test_what_changes_after_attach_is_refused():
     sand = rft.mujoco.attach(model, MAP)
     refused("a Sand cannot be pickled or copied", pickle.dumps, sand)
     refused("attached to 'ball' already: detach it", rft.mujoco.attach, model, MAP)
-    refused("the data are of another model", sand.forces, stranger)
+    refused("the data belong to another model", sand.forces, stranger)
     model.geom_size[0, 0] = 0.05
     refused("'ball' changed after attach: detach the sand", sand.power, data)
     sand.detach()

@@ -56,7 +56,7 @@ def test_errors_of_tasks_are_those_of_the_command(address):
     with using(scheduler=address):
         with pytest.raises(Refusal, match="no such thing as 2"):
             list(runner().map(fails, None, range(4), 4))
-        with pytest.raises(Refusal, match="a cluster cannot know what is to be"):
+        with pytest.raises(Refusal, match="a cluster does not know what to"):
             list(runner().map(lambda c, x: x, None, range(4), 4))
 
 
@@ -86,7 +86,7 @@ def test_a_worker_that_is_ended_loses_nothing(processes, tmp_path, monkeypatch):
         assert list(runner().map(dies, str(tmp_path), range(8), 8)) == [*range(8)]
         assert sorted(x.poll() is None for x in workers) == [False, True]
         local.scheduler.allowed_failures = 0
-        often = "workers were ended again and again at the same part"
+        often = "workers were ended repeatedly during the same task"
         with pytest.raises(RuntimeError, match=often):
             list(runner().map(always_dies, None, [0], 1))
 

@@ -129,7 +129,7 @@ def test_a_link_is_written_through(tmp_path):
 def test_a_folder_replaces_files_alone(make, tmp_path):
     (tmp_path / "out").mkdir()
     make(tmp_path / "out" / "a.txt")
-    with pytest.raises(Refusal, match=r"a\.txt: it is no ordinary file"):
+    with pytest.raises(Refusal, match=r"a\.txt: it is not an ordinary file"):
         write("atomic_folder", tmp_path / "out")
 
 
@@ -173,7 +173,7 @@ def test_a_full_disk_is_named_and_leaves_what_was_there(writer, tmp_path):
     before = paths(tmp_path)
     line = [sys.executable, "-c", LIMITED, writer, tmp_path / "out"]
     said = subprocess.run(line, capture_output=True, text=True).stdout
-    assert f"{tmp_path / 'out'}: File too large; make room" in said
+    assert f"{tmp_path / 'out'}: File too large; free" in said
     assert file.read_text() == "old"
     assert paths(tmp_path) == before
 
@@ -196,8 +196,8 @@ def test_text_is_read_without_its_mark_and_with_one_kind_of_lines(tmp_path):
     [
         ("a", "larger than"),
         ("/proc/self/status", "larger than"),  # says that it is empty
-        ("/dev/zero", "no ordinary file"),
-        ("", "no ordinary file"),
+        ("/dev/zero", "not an ordinary file"),
+        ("", "not an ordinary file"),
         ("none", "No such file"),
     ],
 )

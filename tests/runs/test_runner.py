@@ -86,7 +86,7 @@ def test_what_took_long_is_kept_whatever_ends_it(tmp_path, monkeypatch):
     monkeypatch.setattr(store, "CHECKPOINT", -1.0)
     with pytest.raises(ValueError, match="no such") as ended:
         resumed(tmp_path / "p", lambda: calls() + calls(fails, (5,)))
-    assert ended.value.__notes__[0].startswith("7 results so far are kept")
+    assert ended.value.__notes__[0].startswith("7 results are stored")
     assert resumed(tmp_path / "p", calls)[1] == 0
 
 
@@ -223,7 +223,7 @@ def test_a_stopped_command_says_what_is_kept_and_where(line, small, cache):
         (path,) = [*small.rglob("*.partial"), *cache.glob("*.partial")]
         if path.parent == small:
             path = path.relative_to(small)
-        kept = f"{n_kept} results so far are kept in {path}: the same command goes on"
+        kept = f"{n_kept} results are stored in {path}: repeat the command"
         assert kept in err
 
 

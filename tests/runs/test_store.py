@@ -207,7 +207,7 @@ def test_a_full_disk_is_said_once_and_earlier_results_stay(
 def test_a_folder_that_cannot_be_written_is_said_once(tmp_path, capsys):
     (tmp_path / "file").write_text("")
     put(tmp_path / "file" / "p", 1)
-    assert capsys.readouterr().err.startswith("note: what is done is not kept in ")
+    assert capsys.readouterr().err.startswith("note: results are not stored in ")
 
 
 NO_FILES = {
@@ -221,7 +221,7 @@ NO_FILES = {
 @pytest.mark.parametrize("kind", NO_FILES)
 def test_what_is_no_file_is_refused(kind, tmp_path):
     NO_FILES[kind](tmp_path / "p")
-    with pytest.raises(Refusal, match="it is no ordinary file; remove it"):
+    with pytest.raises(Refusal, match="it is not an ordinary file; remove it"):
         Store(tmp_path / "p")
 
 

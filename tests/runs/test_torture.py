@@ -169,5 +169,7 @@ def test_a_rival_is_refused(place, undisturbed):
     code, _, err = geomech(*REQUESTS["sweep"].split(), cwd=place)
     cure = "wait for it, stop it, or choose another output with -o"
     assert code == 2
-    assert err == f"error: another computation to out.nc is under way: {cure}\n"
+    assert (
+        err == f"error: another computation with the output out.nc is running: {cure}\n"
+    )
     assert output(first, place) == undisturbed

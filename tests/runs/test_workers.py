@@ -75,7 +75,7 @@ def test_an_ended_worker_loses_nothing(tmp_path, monkeypatch):
     with contextlib.closing(executors.Processes(1)) as executor:
         assert each(executor, dies, str(tmp_path), range(8)) == [*range(8)]
         monkeypatch.setattr(pending, "MAX_TRIES", 1)
-        with pytest.raises(RuntimeError, match="at the same part"):
+        with pytest.raises(RuntimeError, match="during the same task"):
             each(executor, always_dies, None, [0])
 
 

@@ -16,8 +16,8 @@ from geomech.scenes import (
     parse,
     walker_names,
 )
-from geomech.scenes.format.key import Key, aliases
-from geomech.scenes.format.keys import SCENES, all_variants, worded
+from geomech.scenes.format.key import MARK, Key, aliases
+from geomech.scenes.format.keys import SCENES, all_variants, sections, worded
 from geomech.scenes.format.schema import schema
 from geomech.scenes.format.sections import file_sections, keys_in
 from rft import CATALOGUE
@@ -50,6 +50,17 @@ def test_every_key_of_every_class_has_a_type_a_unit_and_a_meaning():
             assert key.unit and re.search(r"[a-z]{2}|\|z\|", key.meaning), place
             assert worded(key.schema) != "value", place  # no scene file has its type
             assert key.degrees == (key.unit == "rad"), place
+
+
+def test_a_meaning_ends_where_that_of_the_next_key_begins():
+    """Wherever the line of the docstring breaks."""
+    keys = [key for parts in sections().values() for part in parts for key in part.keys]
+    assert [key.name for key in keys if MARK.search(key.meaning)] == []
+
+
+def test_a_kind_is_described_by_a_whole_sentence_or_not_at_all():
+    described = [part.about for parts in sections().values() for part in parts]
+    assert [about for about in described if re.search(r"^\.|[ ,]\.$", about)] == []
 
 
 # The schema

@@ -47,13 +47,13 @@ FORMS = {
     "mark": ("\ufeff" + PLAIN, ""),
     "UTF-16": (PLAIN.encode("utf-16"), "UTF-16"),
     "UTF-16, no mark": (PLAIN.encode("utf-16-le"), "UTF-16"),
-    "line of units": (PLAIN.replace("_N\n", "_N\nmm,N\n"), "line 2 is one of units"),
+    "line of units": (PLAIN.replace("_N\n", "_N\nmm,N\n"), "line 2 contains units"),
     "units below": (PLAIN.replace("depth_mm,force_N", "Depth,Force\n[mm],[N]"), "units"),
-    "logger": (HEAD + PLAIN + "End (:", "above line 4.*line 10 at its end"),
-    "cut off": (PLAIN + "3.75", "line 7 at its end is no whole row"),
+    "logger": (HEAD + PLAIN + "End (:", "header in line 4.*line 10 at the end of the file"),
+    "cut off": (PLAIN + "3.75", "line 7 at the end of the file is incomplete"),
     "other names": (PLAIN.replace("depth_mm,force_N", "Sinkage (mm),Force / N"), "Sinkage"),
     "ends": (PLAIN.replace("\n", ",\n"), ""),
-    "comment": ("# " + PLAIN, "comment in line 1 is its header"),
+    "comment": ("# " + PLAIN, "comment in line 1 is read as the header"),
     "letters": (PLAIN.replace("\n", ",µ\n").replace("_N,µ", "_N,größe").encode("cp1252"), "1252"),
     "micrometres": (
         "depth (µm),force_N\n"
@@ -115,12 +115,12 @@ def test_cells_that_only_python_takes_for_numbers_are_refused(cell, tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("depth_mm\tforce_N\n1,234\t5,678\n2,345\t6,789\n", "line 2: '1,234' may have a decimal comma, or group"),
-        ('depth_mm,force_N\n"1,234","5,678"\n2,3\n', "line 2: '1,234' may have a decimal comma, or group"),
+        ("depth_mm\tforce_N\n1,234\t5,678\n2,345\t6,789\n", "line 2: '1,234' may have a decimal comma or thousands separators"),
+        ('depth_mm,force_N\n"1,234","5,678"\n2,3\n', "line 2: '1,234' may have a decimal comma or thousands separators"),
         ("depth_mm;force_N\n0,5;1.5\n1,5;2,5\n", "line 2: a row must be 2 finite numbers"),
         ("depth_mm,force_N\nm,N\n1,2\n2,3\n", "line 2: depth_mm is in m here: keep one"),
-        ("1,2\n2,3\n", "line 1: it has no header: its first line has 2 numbers"),
-        ("t,force_N\n1,2\n", "no column depth: it has 't, force_N'; it must have depth_m,force_N"),
+        ("1,2\n2,3\n", "line 1: the file has no header: its first line has 2 numbers"),
+        ("t,force_N\n1,2\n", "no column depth: the columns are 't, force_N'; it must have depth_m,force_N"),
         ("depth (N),force_N\n1,2\n", "line 1: column depth .N. is in 'N': give it in m or cm"),
         ("depth_mm,force_N\n1,2\n2\n3,4\n", "line 3: a row must be 2"),
         ("Operator,5\ndepth_mm,force_N\n1,x\n2,3\n3,4\n", "line 3: a row must be 2"),
@@ -265,7 +265,7 @@ def test_individuals_without_points_are_left_out(tmp_path):
 def test_one_of_several_animals_is_named(text, tmp_path):
     """y runs down in both."""
     path = written(tmp_path / "d.csv", text)
-    with pytest.raises(Refusal, match="2 (individuals|animals) are in it: a, b"):
+    with pytest.raises(Refusal, match="it contains 2 (individuals|animals): a, b"):
         reader.read(path)
     found = reader.read(path, individual="b")
     np.testing.assert_allclose(found.points, (tracks() + 9) * [1, -1])
@@ -280,12 +280,12 @@ WCON = {"units": {"t": "s", "x": "mm", "y": "mm"}, "data": [{"id": "1", "t": [0.
         (
             "a.h5",
             b"\x89HDF\r\n\x1a\n\0\0",
-            "HDF5 file: SLEAP writes CSV by .*DeepLabCut",
+            "HDF5 file: export CSV from SLEAP .*DeepLabCut",
         ),
         (
             "a.wcon",
             json.dumps(WCON).encode(),
-            "a WCON file .JSON.: write a row t,point",
+            "a WCON file .JSON.: write one row t,point",
         ),
         ("a.json", b'[{"x": 1}]', "it is JSON"),
         ("a.xlsx", b"PK\x03\x04\x14\0", "spreadsheet.*: save the sheet as CSV"),
@@ -293,7 +293,7 @@ WCON = {"units": {"t": "s", "x": "mm", "y": "mm"}, "data": [{"id": "1", "t": [0.
         (
             "sysf_three_link.m",
             b"function out = sysf()",
-            "a program of MATLAB.*drag_ratio",
+            "a MATLAB program.*drag_ratio",
         ),
     ],
 )

@@ -82,7 +82,7 @@ BAD = [  # beside those of tests/data/refusals.txt
     ),
     (
         GOOD.replace("lengths = [1, 2, 1]", "lengths = [1, 2]"),
-        r"ellipse moves 2 joints but \[body\] has 1",
+        r"ellipse moves 2 joints, but \[body\] has 1",
     ),
     (
         GOOD.replace("grid = 21", "grid = 3"),

@@ -33,7 +33,7 @@ PLAIN = '[medium]\nname = "glass-0.3mm-loose"\n[body]\nkind = "chain"\n[gait]\nk
 BAD = [  # what frozen refusals cannot hold: files of other kinds, and what is long
     (
         ["connection", "three-link-glass", "-o", "pipe.nc"],
-        "cannot write pipe.nc: it is no ordinary file",
+        "cannot write pipe.nc: it is not an ordinary file",
     ),
     (["run", "broken.toml"], "broken.toml is not TOML"),
     (["run", "-o", "broken.toml"], "cannot write the folder broken.toml"),
@@ -107,7 +107,7 @@ def test_no_input_is_written_over(command, link, name, tmp_path):
     link(tmp_path / name, tmp_path / out)
     code, _, err = geomech(*command.split(), cwd=tmp_path)
     assert code == 2
-    assert f"cannot write {out}: it is an input" in err
+    assert f"cannot write {out}: it is one of the inputs" in err
     assert (tmp_path / name).read_text() == text
 
 
@@ -156,7 +156,7 @@ def pipe(content, endless=False):
     ("content", "endless", "said"),
     [
         (b"y\n" * 5000, True, "cannot read scene '{}': it is larger than 10 MB"),
-        (b"", False, "cannot read scene '{}': nothing came through this pipe"),
+        (b"", False, "cannot read scene '{}': the pipe delivered no data"),
         (b"[medium\n", False, "pipe is not TOML"),
     ],
 )

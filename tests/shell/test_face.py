@@ -67,11 +67,14 @@ def test_a_scene_is_made_of_what_there_is(parts, expected):
 @pytest.mark.parametrize(
     ("parts", "says"),
     [
-        ((3,), "no scene of 3: give the name"),
-        ((CHAIN,), "no scene of Chain"),
-        ((SAND, CHAIN, 4), "no scene of Granular.*, 4: give"),
+        ((3,), "3 do not form a scene: give the name"),
+        ((CHAIN,), "^Chain.* do not form a scene"),
+        ((SAND, CHAIN, 4), "Granular.*, 4 do not form a scene: give"),
         (("sand", CHAIN), "medium: 'sand' is unknown"),
-        (("viscous-2", rft.Backbone(30)), "29 joints has no usual gait"),
+        (
+            ("viscous-2", rft.Backbone(30)),
+            "no default gait exists for a body of 29 joints",
+        ),
         (("three-link-glas",), "did you mean"),
     ],
 )

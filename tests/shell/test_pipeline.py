@@ -84,7 +84,7 @@ def test_what_is_refused_ends_there_and_leaves_nothing(fails, asked):
 @pytest.mark.parametrize(("seconds", "last"), [(100.0, "cost"), (10.0, "compute")])
 def test_too_much_takes_yes_beforehand_and_on_the_way(seconds, last, asked):
     question = asked(seconds=seconds)
-    with pytest.raises(Refusal, match="say yes, or ask for less"):
+    with pytest.raises(Refusal, match="use yes, or request less"):
         pipeline.execute(question, [output(question)])
     assert question.told[-1] == last
     pipeline.execute(question, [output(question)], yes=True)
@@ -94,7 +94,7 @@ def test_too_much_takes_yes_beforehand_and_on_the_way(seconds, last, asked):
     ("names", "said"),
     [
         (["no/out.csv"], "cannot write no/out.csv"),
-        (["s.toml"], "it is an input"),
+        (["s.toml"], "it is one of the inputs"),
         (["out.csv", "out.csv"], "twice"),
         (["out.csv", "link.csv"], "twice"),
     ],

@@ -40,3 +40,31 @@ def test_an_old_option_is_the_new_one_with_a_note(old):
     assert told[0] == same[0]
     assert seconds.sub("", told[1]) == seconds.sub("", same[1])
     assert f"{old} is now {new}" in told[2]
+
+
+WIDTH, HEIGHT = 80, 24  # of a terminal
+
+
+def test_the_help_fits_a_terminal_and_names_all_commands():
+    code, out, _ = geomech("--help")
+    assert code is None or code == 0
+    assert len(out.splitlines()) < HEIGHT
+    assert max(map(len, out.splitlines())) <= WIDTH
+    described = re.findall(r"^  ([a-z][a-z-]+)  ", out, re.M)
+    assert len(described) == 8
+    assert {*cli.Commands()} <= {*re.findall(r"[a-z-]+", out)}
+
+
+def test_the_full_help_describes_all_commands():
+    _, out, _ = geomech("--help-all")
+    assert {*cli.Commands()} == {*re.findall(r"^  ([a-z][a-z-]+)  ", out, re.M)}
+    assert "--install-completion" in out
+
+
+def test_options_that_few_need_come_last():
+    _, out, _ = geomech("displacement", "--help")
+    last = out.split("\n\n")[-1]
+    assert last.startswith("Advanced:")
+    options = set(re.findall(r"^  (--[a-z]+)", last, re.M))
+    assert options >= {"--workers", "--scheduler", "--plugin", "--yes", "--grid"}
+    assert not options & {"--plot", "--json", "--tol"}

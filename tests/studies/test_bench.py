@@ -143,7 +143,7 @@ GAIT = '\n[gait]\nkind = "circle"'
             PLAIN + SIZES + CAPS + "radius_m = 1.0",
             r"effects\]\] radius_m = 1.0, but \[physical\] radius_m = 0.006: keep one",
         ),
-        (PLAIN + "[physical]\nmass = 1.0", r"\[physical\] mass: nothing in this scene"),
+        (PLAIN + "[physical]\nmass = 1.0", r"\[physical\] mass: no part of this scene"),
         (PLAIN + "[physical]\nmas = 1.0", r"\[physical\] key: 'mas' is unknown: did"),
         ("frame = 3\n" + PLAIN, r"\[body\] Expected `str`, got `int`"),
         (
@@ -177,6 +177,8 @@ def test_a_gait_that_leaves_the_field_between_few_phases_is_refused(sign):
     amplitude = 2.5 * (1 + 1e-7) - 0.1
     gait = Fourier(cos, sin, amplitude=amplitude, centre=(0.1 * sign, 0.0))
     refuse_outside(GLASS, gait, phases=4096)
-    outside = f"alpha_1 = {sign * 2.5} rad lies outside the field's -2.5 to 2.5"
+    outside = (
+        f"alpha_1 = {sign * 2.5} rad lies outside the field, which covers -2.5 to 2.5"
+    )
     with pytest.raises(Refusal, match=outside):
         refuse_outside(GLASS, gait, phases=8192)

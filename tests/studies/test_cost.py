@@ -204,12 +204,12 @@ def test_too_many_open_files_are_said_and_nothing_is_left(tmp_path):
     line = "ulimit -n 6; exec geomech trajectory three-link-viscous -o a.csv"
     done = ran(line, tmp_path, text=True)
     assert done.returncode == 2
-    said = "error: too many files are open at once: raise the limit, as by 'ulimit -n"
+    said = "error: too many files are open at once: raise the limit, for example with 'ulimit -n"
     assert done.stderr.startswith(said)
     assert {p.suffix for p in tmp_path.iterdir()} <= {".partial"}
 
 
-FULL = "No space left on device; make room, or send it elsewhere"
+FULL = "No space left on device; free some disk space, or redirect the output"
 
 
 @pytest.mark.parametrize(

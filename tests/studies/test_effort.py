@@ -117,12 +117,12 @@ def test_errors_of_work_in_time_stepping_cover_steps_and_pieces(effect):
 @pytest.mark.parametrize(
     ("system", "gait", "said"),
     [
-        (NoSlipSnake(), GAIT, "nothing says what moving costs"),
+        (NoSlipSnake(), GAIT, "nothing defines what moving costs"),
         (Swimmer(SAND, Chain((1, 1, 1, 1))), THREE_JOINTS, "of 3 joints"),
         (
             Swimmer(SAND, Chain(), (SkinFriction(0.3, 0.6),)),
             GAIT,
-            "another power than the way back",
+            "differs between opposite directions",
         ),
         (Swimmer(SAND, Chain(), (Transient(travel=0.1),)), GAIT, "not memoryless"),
     ],

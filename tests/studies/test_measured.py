@@ -295,7 +295,7 @@ def test_rows_at_uneven_times_tell_the_same(viscous):
 
 def test_cycles_that_do_not_vary_tell_the_displacement_and_no_more(viscous):
     f = fitted(viscous, seed=1, spread=0.0, cycles=14)
-    assert results.status(f).startswith("fitted along the gait alone")
+    assert results.status(f).startswith("fitted only along the gait")
     assert is_covered(f.displacement, true_net(f, viscous)).all()
     n = np.abs(f.taylor.loop.normals(PLACES))
     across = (f.along(PLACES)[1] @ n)[..., 0]
@@ -368,7 +368,7 @@ def tied(rows, noise, spread=0.05):
 
 SUM = (
     [[1, 1]],
-    "alpha_3 is 1 alpha_1 \\+ 1 alpha_2, but for .* leave alpha_3 out of the columns$",
+    "alpha_3 is 1 alpha_1 \\+ 1 alpha_2, apart from .* leave alpha_3 out of the columns$",
 )
 
 
@@ -388,7 +388,7 @@ def test_joints_that_follow_from_others_are_named(noise, rows, said):
     f = measured.fit_log(tied(rows, noise))
     # Noise moves the third digit.
     found = re.sub(r"\d\.\d+", lambda x: f"{float(x[0]):.1g}", results.status(f))
-    assert re.match("fitted along the gait alone: " + said, found)
+    assert re.match("fitted only along the gait: " + said, found)
 
 
 @pytest.mark.parametrize(
@@ -532,9 +532,11 @@ def test_what_the_data_do_not_reach_is_refused(field):
     scene = load(field / "mine.toml")
     with refused(r"the data do not reach alpha = \(0.2, -0.1\), \d"):
         scene.system.velocity(np.array([0.2, -0.1]), np.array([1.0, 0.0]))
-    with refused("area tier sums a field up, and A is known near the mean gait"):
+    with refused(
+        "area tier integrates a field, and A is known only near the mean gait"
+    ):
         SceneTables(scene).poses("area")
-    with refused("no gait but one to search"):
+    with refused("there is only one gait to search"):
         optimise(scene, "displacement")
 
 
@@ -565,15 +567,15 @@ def test_lengths_and_signs_of_a_field(usual, field):
     [
         (lambda d: d.drop_vars("gait_slope"), "no gait_slope that fits it"),
         (lambda d: d.assign(gait_beyond=d.gait_beyond.expand_dims("more")), "no gait_beyond that fits it"),
-        (lambda d: d.assign(gait_spread=d.gait_spread * (2 * d.joint - 3)), "parts do not fit"),
-        (lambda d: d.isel(normal=[0, 0]), "parts do not fit"),
-        (lambda d: d.isel({d.gait_A.dims[-1]: slice(1, None)}), "parts do not fit"),
-        (lambda d: d.isel(along_and_across=[0, 1, 1]), "parts do not fit"),
-        (lambda d: d.assign_attrs(level=1.0), "parts do not fit"),
-        (lambda d: d.assign_attrs(level=b"most"), "parts do not fit"),
-        (lambda d: d.assign_attrs(error_factor=0.0), "parts do not fit"),
-        (lambda d: d.assign_attrs(error_factor=1e6), "parts do not fit"),
-        (lambda d: d.assign_attrs(error_factor=[2.0, 2.0]), "parts do not fit"),
+        (lambda d: d.assign(gait_spread=d.gait_spread * (2 * d.joint - 3)), "parts do not match"),
+        (lambda d: d.isel(normal=[0, 0]), "parts do not match"),
+        (lambda d: d.isel({d.gait_A.dims[-1]: slice(1, None)}), "parts do not match"),
+        (lambda d: d.isel(along_and_across=[0, 1, 1]), "parts do not match"),
+        (lambda d: d.assign_attrs(level=1.0), "parts do not match"),
+        (lambda d: d.assign_attrs(level=b"most"), "parts do not match"),
+        (lambda d: d.assign_attrs(error_factor=0.0), "parts do not match"),
+        (lambda d: d.assign_attrs(error_factor=1e6), "parts do not match"),
+        (lambda d: d.assign_attrs(error_factor=[2.0, 2.0]), "parts do not match"),
         (lambda d: d.assign(gait=0 * d.gait), "a gait that does not move"),
     ],
 )  # fmt: skip
@@ -623,26 +625,26 @@ def late(rows):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda r: np.delete(r, slice(100, 120), 0), "line 101: no rows for 0.7 after this one .*, its one gap: cut"),
+        (lambda r: np.delete(r, slice(100, 120), 0), "line 101: no rows for 0.7 after this one .*, its only gap: cut"),
         (lambda r: np.delete(r, [*range(100, 120), *range(220, 230)], 0), "line 101: .*, the longest of 2 gaps: cut"),
-        (lambda r: r[: 9 * 30 + 15], "7 whole cycles, .*, are too few: give at least 10 in all"),
+        (lambda r: r[: 9 * 30 + 15], "7 full cycles, .*, are too few: give at least 10 in all"),
         (lambda r: r[[*range(100), 101, 100, *range(102, 300)]], "line 103: t = .* comes after .*: sort the rows by time"),
         (changed(0, lambda r: r[0, 0], slice(99, 101)), "line 102: t = .* is given twice: keep one"),
-        (changed(5, lambda r: np.degrees(r[:, 5]) % 360), "line 3: heading jumps by 359.3, a turn in degrees: say degrees"),
-        (changed(2, lambda r: 0.3 - 0.5 * r[:, 1] + noise(r)), "alpha_2 is -0.5 times alpha_1, but for a constant and noise"),
+        (changed(5, lambda r: np.degrees(r[:, 5]) % 360), "line 3: heading jumps by 359.3, a full turn in degrees: add degrees"),
+        (changed(2, lambda r: 0.3 - 0.5 * r[:, 1] + noise(r)), "alpha_2 is -0.5 times alpha_1, apart from a constant and noise"),
         (changed(2, lambda r: 0.2 + noise(r)), "alpha_2 does not move beyond its noise: leave it out with columns"),
-        (changed(2, lambda r: r[:, 0] / 14 + noise(r)), "alpha_2 drifts from 0.1.* to 0.8.* over the log and swings by"),
-        (changed(slice(3, 5), lambda r: 1e12 * r[:, 3:5]), "entries of A come out as large as .*: give x and y in body"),
+        (changed(2, lambda r: r[:, 0] / 14 + noise(r)), "alpha_2 drifts from 0.1.* to 0.8.* over the log and oscillates by"),
+        (changed(slice(3, 5), lambda r: 1e12 * r[:, 3:5]), "entries of A reach .*: give x and y in body"),
         (changed(2, lambda r: 0.4), "alpha_2 does not move"),
         (changed(slice(3, 6), lambda r: 0.0), "x, y and heading do not move"),
-        (changed(4, lambda r: np.nan, [77]), "line 79: a row must be .*, column y, got .*: mend that row, or drop it"),
+        (changed(4, lambda r: np.nan, [77]), "line 79: a row must be .*, column y, got .*: correct that row, or remove it"),
         (lambda r: r[: 8 * 30 + 15], r"the joints repeat 8\.. times: give at least 10 cycles"),
-        (lambda r: r[::4], "7.6 rows a cycle are too few: give at least 12"),
-        (changed(3, lambda r: r[:, 3] + 1, [200]), "line 202: x is .* off the rows before and after: mend that row"),
+        (lambda r: r[::4], "7.6 rows per cycle are too few: give at least 12"),
+        (changed(3, lambda r: r[:, 3] + 1, [200]), "line 202: x differs by .* from the rows before and after: correct that row"),
         (changed(4, lambda r: r[:, 4] - 1, slice(202, None)), "line 204: y jumps by -1 to this row: the tracking slipped"),
         (changed(0, lambda r: 1e-9 * r[:, 0]), "the joints repeat every .*e-09 where t is in s: give t in s"),
         (changed(0, lambda r: 100 + r[:, 0] + 0.3 * late(r)), "the joints repeat every 1.01 .* every 1.28 in the last: two"),
-        (changed(0, lambda r: r[:, 0] + late(r)), "line 33: the gait stands, slips or runs back .*: cut pauses"),
+        (changed(0, lambda r: r[:, 0] + late(r)), "line 33: the gait pauses, slips or runs backwards .*: cut out pauses"),
         (changed(1, lambda r: 0.4 * r[:, 1] - 1, slice(200, None)), "line 202: alpha_1 jumps by .* two gaits"),
         (
             changed(slice(1, 3), lambda r: 1.25 * r[:, 1:3] - 0.25 * GAIT.middle, slice(205, None)),
@@ -681,7 +683,7 @@ def columns_of(path, header, rows=120, value=0.0, column=1):
         ("t_s b1 b2 joint3 joint1 x y yaw", "joint1 joint3", True),
     ],
 )  # fmt: skip
-@pytest.mark.filterwarnings("ignore:.*joint angles of at most")
+@pytest.mark.filterwarnings("ignore:.*joint angles are at most")
 def test_columns_are_known_by_their_names(header, joints, seconds, tmp_path):
     log = measured.read(columns_of(tmp_path / "log.csv", header))
     assert log.joints == tuple(joints.split()) and log.seconds == seconds
@@ -691,20 +693,20 @@ def test_columns_are_known_by_their_names(header, joints, seconds, tmp_path):
 @pytest.mark.parametrize(
     ("header", "columns", "said"),
     [
-        ("t a1 a2 x y", "", "line 1: no column heading: it has 't, a1, a2, x, y'; name them t,alpha_1"),
-        ("t b1 b2 x y yaw", "", "line 1: no columns of joint angles, and a gait is a loop of two or more: it has"),
-        ("t a1 bend x y yaw", "", "line 1: one column of joint angles, and a gait is"),
-        ("t a1 a2 a1 x y yaw", "", "line 1: the column 'a1' is there twice"),
-        ("t a1 a2 x y yaw theta", "", "line 1: yaw and theta may both be the column heading"),
-        ("t a b x y c", "t a b x y d", "line 1: no column 'd'; it has 't, a, b, x, y, c'"),
-        ("t a x y c", "t a x y c", "columns are those of t, two joint angles or more"),
+        ("t a1 a2 x y", "", "line 1: no column heading: the columns are 't, a1, a2, x, y'; name them t,alpha_1"),
+        ("t b1 b2 x y yaw", "", "line 1: no columns of joint angles, but a gait is a loop of two or more: the columns are"),
+        ("t a1 bend x y yaw", "", "line 1: one column of joint angles, but a gait is"),
+        ("t a1 a2 a1 x y yaw", "", "line 1: the column 'a1' appears twice"),
+        ("t a1 a2 x y yaw theta", "", "line 1: both yaw and theta could be the column heading"),
+        ("t a b x y c", "t a b x y d", "line 1: no column 'd'; the columns are 't, a, b, x, y, c'"),
+        ("t a x y c", "t a x y c", "columns must list t, two or more joint angles"),
         ("t a b x y c", "t a a x y c", "columns are those of t"),
         ("t a1 a2 a3 a4 a5 a6 a7 x y yaw", "", "7 joint angles, more than 6"),
-        ("t a1 a2 x_mm y yaw", "", "line 1: x_mm and y are in two units"),
+        ("t a1 a2 x_mm y yaw", "", "line 1: x_mm and y have different units"),
         ("t a1 a2 x_px y_px yaw", "", "line 1: x_px is in px by its name: give x and y in body lengths"),
         ("t a1 a2 x_N y_N yaw", "", "line 1: x_n is in N by its name"),
         ("t a1_mm a2_mm x y yaw", "", "line 1: a1_mm is in mm by its name: give angles in rad, or in degrees"),
-        ("t a1_deg a2 x y yaw", "", "line 1: a2 has no unit beside joints that have one"),
+        ("t a1_deg a2 x y yaw", "", "line 1: a2 has no unit, but other joints have one"),
         ("hello", "", "no header of columns: give a CSV file with a header such as t,alpha_1,alpha_2,x,y,heading"),
     ],
 )  # fmt: skip
@@ -730,13 +732,13 @@ IN_DEGREES = "t a1_deg a2_deg x y heading_deg"
     [
         ("t a1 a2 x y heading", 1, 6.24, ""),
         ("t a1 a2 x y heading", 1, -6.34, "line 52: a1 reaches -6.3.* where joint angles are in rad: say degrees"),
-        (IN_DEGREES, 2, 1799.0, ""), (IN_DEGREES, 2, -1805.0, "line 52: a2_deg reaches -1805 degrees: no joint turns so far"),
-        ("t a1 a2 x y heading", 5, 331.0, "line 52: heading jumps by 331, a turn in degrees: say degrees"),
+        (IN_DEGREES, 2, 1799.0, ""), (IN_DEGREES, 2, -1805.0, "line 52: a2_deg reaches -1805 degrees: no joint turns that far"),
+        ("t a1 a2 x y heading", 5, 331.0, "line 52: heading jumps by 331, a full turn in degrees: add degrees"),
         ("t a1 a2 x y heading", 5, -389.0, "jumps by 38"), ("t a1 a2 x y heading", 5, 329.0, ""),
         ("t a1 a2 x y heading", 5, 391.0, ""), (IN_DEGREES, 5, 360.0, ""),
     ],
 )  # fmt: skip
-@pytest.mark.filterwarnings("ignore:.*joint angles of at most")
+@pytest.mark.filterwarnings("ignore:.*joint angles are at most")
 def test_degrees_are_told_from_radians(header, column, value, said, tmp_path):
     path = columns_of(tmp_path / "log.csv", header, 120, value, column)
     with refused(said):
@@ -744,7 +746,7 @@ def test_degrees_are_told_from_radians(header, column, value, said, tmp_path):
 
 
 def test_radians_that_are_read_as_degrees_are_noted(tmp_path):
-    with pytest.warns(UnitWarning, match="log.csv: joint angles of at most 6.2"):
+    with pytest.warns(UnitWarning, match="log.csv: joint angles are at most 6.2"):
         measured.read(columns_of(tmp_path / "log.csv", IN_DEGREES, 120, -6.25, 2))
 
 
@@ -784,7 +786,7 @@ def test_an_angle_without_a_unit_is_in_radians_and_that_is_said(short, tmp_path)
     names = ("time", "joint1_deg", "joint2_deg", "x", "y", "theta")
     degrees = changed(slice(1, 3), lambda r: np.degrees(r[:, 1:3]))
     path = written(tmp_path / "c.csv", short, names, degrees)
-    with pytest.warns(Note, match="theta is taken to be in rad"):
+    with pytest.warns(Note, match="theta is assumed to be in rad"):
         log = measured.read(path)
     np.testing.assert_allclose(log.alpha, short.alpha)
 
@@ -825,7 +827,7 @@ def test_a_left_handed_pose_is_refused(moving):
         moving.pose[:, [1, 0, 2]],
         moving.pose * [1, 1, -1] + [0, 0, 2],
     ):
-        with refused("x, y and heading do not fit each other, .* give y upwards"):
+        with refused("x, y and heading do not agree, .* give y pointing up"):
             measured.fit_log(log_of(moving._replace(pose=wrong)), harmonics=2)
 
 
@@ -872,11 +874,11 @@ def smooth_of(values, noise=0.0, knots=4.0):
 @pytest.mark.parametrize(
     ("speed", "turn", "period", "length", "facts", "said"),
     [
-        (0.98, 1.96, 299.0, 1.0, {}, ()), (1.02, 0.0, 1.0, 1.0, {}, ("x and y move by 2.04 body lengths where",)),
+        (0.98, 1.96, 299.0, 1.0, {}, ()), (1.02, 0.0, 1.0, 1.0, {}, ("x and y move by 2.04 body lengths while",)),
         (0.5, 2.02, 1.0, 1.0, {}, ("the heading turns 4.04 times as fast as the joints",)),
         (2.9, 0.0, 1.0, 3.0, {"metres": True}, ()), (0.5, 0.0, 301.0, 1.0, {"seconds": False}, ()),
         (3.1, 0.0, 301.0, 3.0, {}, ("x and y move by 2.07", "the joints repeat every 301, and t is")),
-        (0.5, 0.0, 1.0, None, {"metres": True}, ("x and y are in m by the names",)),
+        (0.5, 0.0, 1.0, None, {"metres": True}, ("the column names give x and y in m",)),
         (0.5, 0.0, 1.0, 1.0, {"metres": True}, ()),
     ],
 )  # fmt: skip

@@ -156,7 +156,9 @@ def test_cycles_that_repeat_without_noise_have_small_errors(exact):
 
 def test_the_head_is_found_from_the_motion_and_said(exact, noisy, fitted):
     found = fit.fit_midlines(noisy.trial().reversed())
-    assert fitted.head == "30, by the motion: it moves there, against its wave"
+    assert (
+        fitted.head == "30, by the motion: the body moves towards it, against its wave"
+    )
     np.testing.assert_allclose(found.sample.value, fitted.sample.value, atol=1e-6)
     first = fit.fit_midlines(exact.trial(), head="first")
     assert first.head == "1, as given; it moves tail first"
@@ -420,28 +422,28 @@ INDIVIDUALS = "scorer,net,net\nindividuals,one,two\nbodyparts,a,a\ncoords,x,y\n0
 @pytest.mark.parametrize(
     ("text", "old", "new", "options", "said"),
     [
-        (LONG, "\n1,3,7,7\n", "\n1,3\n", {}, "line 9: 2 cells under 4 columns: mend that row"),
-        (LONG, "\n0,4,", "\n,4,", {}, "line 5, column t: '' is no time: give the time"),
-        (LONG, "\n0,4,3,3", "\n0,4,3,1e13", {}, r"line 5, column y: '1e13' is no number up to 1e\+12: mend it"),
+        (LONG, "\n1,3,7,7\n", "\n1,3\n", {}, "line 9: 2 cells in a table of 4 columns: correct that row"),
+        (LONG, "\n0,4,", "\n,4,", {}, "line 5, column t: '' is not a time: give the time"),
+        (LONG, "\n0,4,3,3", "\n0,4,3,1e13", {}, r"line 5, column y: '1e13' is not a number of at most 1e\+12: correct it"),
         (LONG, "\n1,4,8,8", "\n1,2,8,8", {}, "line 10: point 2 is given twice at t = 1: keep one"),
-        (LONG.replace("point", "other"), "\n0,4,3,3", "\n5,4,3,3", {}, "line 2: 4 points at t = 0, and 5 at most others"),
-        (LONG, "x,y", "x,x", {}, "line 1: the column 'x' is there twice"),
+        (LONG.replace("point", "other"), "\n0,4,3,3", "\n5,4,3,3", {}, "line 2: 4 points at t = 0, but at most 5 at other times"),
+        (LONG, "x,y", "x,x", {}, "line 1: the column 'x' appears twice"),
         (LONG, "t,", "t_mm,", {}, "line 1: t_mm is in mm: give t in s or ms"),
-        (WIDE, ",y1,x2,y2,x3,y3,x4,y4", "", {}, "line 1: no columns of points: it has 't, x0, y0, x1'; give a CSV file"),
-        (WIDE, "t,", "s,", {}, "line 1: no column t or frame: it has 's, x0, .*name the column of the time t"),
-        (WIDE, "x0,y0", "x_0_mm,y_0_mm", {}, "line 1: columns in mm and in no unit: give all x and y in one unit"),
+        (WIDE, ",y1,x2,y2,x3,y3,x4,y4", "", {}, "line 1: no columns of points: the columns are 't, x0, y0, x1'; give a CSV file"),
+        (WIDE, "t,", "s,", {}, "line 1: no column t or frame: the columns are 's, x0, .*call the column of the time t"),
+        (WIDE, "x0,y0", "x_0_mm,y_0_mm", {}, "line 1: columns in mm and in no unit: give all x and y in the same unit"),
         (WIDE, "\n3,", "\n2,", {}, "line 5: t = 2 is given twice: keep one of the rows"),
         (WIDE, "\n3,", "\n1.5,", {}, "line 5: t = 1.5 comes after 2: sort the rows by time"),
-        (WIDE, "t,", "frame,", {"points": ["3", "2", "1", "3", "4"]}, "columns name a point twice: name each once"),
+        (WIDE, "t,", "frame,", {"points": ["3", "2", "1", "3", "4"]}, "columns name a point twice: list each once"),
         (WIDE, "", "", {"points": ["0", "1", "2", "3", "7"]}, "7"),
-        (WIDE, "", "", {"points": ["0", "1", "2", "3"]}, "4 points along the body: give 5 to 1000, better 10"),
+        (WIDE, "", "", {"points": ["0", "1", "2", "3"]}, "4 points along the body: give 5 to 1000, preferably 10"),
         (WIDE, "\n11,0,1,2,3,4,5,6,7,8,-2", "", {}, "11 frames: give a whole trial"),
-        (WIDE, "", "", {"fps": 50.0}, "fps is that of a file that counts frames: drop it, the file has a time"),
-        (LONG, "x,y", "x_mm,y_mm", {"units": "cm"}, "x and y are in mm by the names of their columns: drop units"),
-        (LONG, "x,y", "x_mm,y_mm", {"scale": 0.4}, "scale is that of pixels: drop it, x and y are in mm"),
-        (LONG, "", "", {"units": "cm", "scale": 0.4}, "scale is that of pixels: drop it, x and y are in cm"),
-        (TRACKS, "", "", {}, "2 animals are in it: b, a"),
-        (INDIVIDUALS, "", "", {}, "2 individuals are in it: one, two"),
+        (WIDE, "", "", {"fps": 50.0}, "fps applies to a file that counts frames: remove it: the file has a time"),
+        (LONG, "x,y", "x_mm,y_mm", {"units": "cm"}, "the column names give x and y in mm: remove units"),
+        (LONG, "x,y", "x_mm,y_mm", {"scale": 0.4}, "scale applies to pixels: remove it: x and y are in mm"),
+        (LONG, "", "", {"units": "cm", "scale": 0.4}, "scale applies to pixels: remove it: x and y are in cm"),
+        (TRACKS, "", "", {}, "it contains 2 animals: b, a"),
+        (INDIVIDUALS, "", "", {}, "it contains 2 individuals: one, two"),
     ],
 )  # fmt: skip
 def test_bad_files_are_refused_by_place(text, old, new, options, said, tmp_path):
@@ -456,8 +458,8 @@ def test_bad_files_are_refused_by_place(text, old, new, options, said, tmp_path)
         ("x_mm,y_mm", {}, "m", 1e-3, ""), ("x,y", {"units": "cm"}, "m", 1e-2, ""), ("x_m,y_m", {"units": "m"}, "m", 1.0, ""),
         ("x_BL,y_BL", {}, "BL", 1.0, ""), ("x,y", {"units": "BL"}, "BL", 1.0, ""), ("x_px,y_px", {"scale": 0.4}, "m", 4e-4, ""),
         ("x,y", {"scale": 0.4}, "m", 4e-4, ""), ("x_px,y_px", {"units": "mm"}, "m", 1e-3, ""),
-        ("x,y", {}, "", 1.0, "lengths are in body lengths alone: nobody says the unit of x and y, say units"),
-        ("x_px,y_px", {}, "", 1.0, "lengths are in body lengths alone: nobody says how long a pixel is"),
+        ("x,y", {}, "", 1.0, "lengths are in body lengths only: the unit of x and y is unknown; add units"),
+        ("x_px,y_px", {}, "", 1.0, "lengths are in body lengths only: the size of a pixel is unknown"),
     ],
 )  # fmt: skip
 def test_units_of_lengths_are_those_of_the_header_or_of_options(
@@ -562,23 +564,23 @@ def bent_back(degrees):
     ("change", "said"),
     [
         (at(30, lambda p: 3.9 * p[30]), "it jumps by 0.29"), (at(30, lambda p: p[30] / 3.9), "it jumps by 0.074"),
-        (at(30, lambda p: 4.1 * p[30]), r"line 32 \(t = 3\): the body is 4.1 times as long as in most frames: mend or drop"),
-        (at(30, lambda p: p[30] / 4.1), "the body is 0.244 times as long as in most frames: mend"),
+        (at(30, lambda p: 4.1 * p[30]), r"line 32 \(t = 3\): the body is 4.1 times as long as in most frames: correct or remove"),
+        (at(30, lambda p: p[30] / 4.1), "the body is 0.244 times as long as in most frames: correct"),
         (at(30, lambda p: 12.9 * p[30]), "frames: mm for m, or another such unit"),
-        (at(30, lambda p: 13.1 * p[30]), "in most frames: mend"), (at(30, lambda p: p[30] / 129), "mm for m"),
-        (at(30, lambda p: p[30] / 132), "most frames: mend"), (at(30, lambda p: 710 * p[30]), "mm for m"),
-        (bent_back(119), ""), (bent_back(121), "from 4 by 5 to 6 the body turns back in most frames: points"),
+        (at(30, lambda p: 13.1 * p[30]), "in most frames: correct"), (at(30, lambda p: p[30] / 129), "mm for m"),
+        (at(30, lambda p: p[30] / 132), "most frames: correct"), (at(30, lambda p: 710 * p[30]), "mm for m"),
+        (bent_back(119), ""), (bent_back(121), "the body turns back from 4 by 5 to 6 in most frames: points"),
         (at((slice(20), 4), np.nan), ""),
         (at((slice(21), 4), np.nan), "trial.csv: point 5 is missing in 52.5 % of the frames: leave it out"),
         (at((slice(None), 3), 0.0), "point 4 never moves"),
-        (at((slice(None), 4), lambda p: p[:, 3]), "points 4 and 5 are in one place"),
+        (at((slice(None), 4), lambda p: p[:, 3]), "points 4 and 5 coincide"),
         (at((slice(20), [0, 1, 2, 3]), np.nan), ""),
         (turned_beside(0.25), ""),
-        (turned_beside(0.22), r"line 2 \(t = 0\): 12 frames run from the other end of the body, the first is this one: turn"),
+        (turned_beside(0.22), r"line 2 \(t = 0\): 12 frames start at the other end of the body, of which this is the first: reverse"),
         (moved(0.0, 0.0, 0.029), ""), (moved(0.0, 0.0, 0.031), r"line 22 \(t = 2, point 4\): it jumps by 0.031 body lengths"),
         (moved(0.01, 0.0, 0.079), ""), (moved(0.01, 0.0, 0.081), "jumps by 0.081"), (moved(0.0, 0.01, 0.089), ""),
-        (moved(0.0, 0.01, 0.091), "jumps by 0.091"), (moved(0.0, 0.02, -0.25), "jumps by 0.25 body lengths from where"),
-        (at((30, [2, 8]), lambda p: p[30, [8, 2]]), r"line 32 \(t = 3, point 3\): points 3 and 9 swap: mend them"),
+        (moved(0.0, 0.01, 0.091), "jumps by 0.091"), (moved(0.0, 0.02, -0.25), "jumps by 0.25 body lengths from its place"),
+        (at((30, [2, 8]), lambda p: p[30, [8, 2]]), r"line 32 \(t = 3, point 3\): points 3 and 9 swap: correct them"),
     ],
 )  # fmt: skip
 def test_slips_of_tracking_are_refused_by_place(change, said):
@@ -648,19 +650,19 @@ def slower(by):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (sized(120, unit="m"), "the body is 1.. m long: say the unit of x and y"),
+        (sized(120, unit="m"), "the body is 1.. m long: give the unit of x and y"),
         (sized(9e-5, unit="m"), "the body is .*e-05 m long"),
-        (sized(2), "the body is 2.01 body lengths long: say the unit"), (sized(0.69), "the body is 0.69. body lengths"),
-        (sized(1, length=0.7), "the points lie along 1.* and the body is 0.7 long: give body_length in the unit of x and y"),
+        (sized(2), "the body is 2.01 body lengths long: give the unit"), (sized(0.69), "the body is 0.69. body lengths"),
+        (sized(1, length=0.7), "the points extend over 1.* but the body is 0.7 long: give body_length in the unit of x and y"),
         (at((slice(None), [3, 20]), lambda p: p[:, [20, 3]]), "turns back"),
-        (lambda t: frames_of(t, slice(None, None, 4)), "frames a cycle are too few: give at least 10"),
-        (lambda t: frames_of(t, slice(20)), "the trial has 0.[0-9]* cycles: give one full cycle at least"),
+        (lambda t: frames_of(t, slice(None, None, 4)), "frames per cycle are too few: give at least 10"),
+        (lambda t: frames_of(t, slice(20)), "the trial has 0.[0-9]* cycles: give at least one full cycle"),
         (at(np.indices((133, 30)).sum(0) % 2 * (np.arange(133) > 9)[:, None] > 0, np.nan), "10 frames have most"),
-        (standing, "the body bends in one shape to and fro"),
-        (backwards, "moves towards its point 1, and so does its wave: most .*say which end is the head, head first or last"),
-        (wandering, "the body does not repeat its motion: give one cycle"),
+        (standing, "the body bends back and forth in one shape"),
+        (backwards, "moves towards its 1 point, and so does its wave: most .*state which end is the head: head first or last"),
+        (wandering, "the body does not repeat its motion: give at least one cycle"),
         (rippling, "the cycle from t = 0.2371 to 1.215 does not repeat the others .*: cut it out"),
-        (lambda t: frames_of(t, np.arange(133) % 30 < 20), "no frames for 0.367 after this one, and so in every cycle"),
+        (lambda t: frames_of(t, np.arange(133) % 30 < 20), "no frames follow for 0.367 after this one, so that every cycle has a gap"),
         (slower(2.0), "the cycle from t = 1.16 to 3.499 takes 1.7 times as long as most"),
     ],
 )  # fmt: skip
@@ -686,7 +688,7 @@ def test_another_motion_within_a_trial_is_refused_by_its_times(noisy):
     other = synthetic.synthetic_midlines(GLASS, 1.5, 30, waves=2.4, swing=0.5, seed=1)
     shift = noisy.points[-1].mean(0) - other.points[0].mean(0)
     points = np.concatenate([noisy.points, other.points + shift])
-    with refused("the motion stands, or is another one, after t = [45]"):
+    with refused("the motion pauses or changes after t = [45]"):
         fit.fit_midlines(trial_of(np.arange(len(points)) / 30, points), mend=True)
 
 

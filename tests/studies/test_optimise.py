@@ -272,7 +272,7 @@ def test_linear_limits_of_loops_are_their_box(amplitude, centre, inside):
 
 def test_a_start_beyond_the_limit_is_drawn_together(capsys):
     found = optimise(viscous(), limits=0.6)
-    assert "its gait reaches beyond 0.6" in capsys.readouterr().err
+    assert "its gait exceeds 0.6" in capsys.readouterr().err
     small = SceneTables(viscous()).poses("direct", Circle(), [0.6])[0]
     assert found.start.value == pytest.approx(np.hypot(*small[:2]), rel=1e-3)
     assert found.value > found.start.value
@@ -484,7 +484,7 @@ def test_a_table_that_never_turns_is_refused(tmp_path):
     drive = geomech.load("differential-drive").with_numerics(extent=2.0, grid=7)
     fields.save_connection(tmp_path / "drive.nc", SceneTables(drive))
     table = Scene(Table(tmp_path / "drive.nc"), Circle())
-    with pytest.raises(Refusal, match="no gait turns it: the table's file tells"):
+    with pytest.raises(Refusal, match="no gait turns it: the table's file describes"):
         build_request(table, "turning")
 
 
@@ -536,7 +536,7 @@ def test_a_scene_in_the_minimum_perturbation_frame(cheap):
     found = optimise(scene, "efficiency")
     assert found.value == pytest.approx(cheap.value, rel=1e-3)
     assert abs(found.best.displacement[1]) < 0.3 * abs(cheap.best.displacement[1])
-    with pytest.raises(Refusal, match="outside the field that the scene has"):
+    with pytest.raises(Refusal, match="outside the field of the scene"):
         build_request(scene, "efficiency", limits=[(-1.0, 1.0), (-1.0, 3.0)])
 
 

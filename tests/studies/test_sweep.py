@@ -206,11 +206,15 @@ def test_one_frequency_is_that_of_all_effects():
     ("scene", "over", "said"),
     [
         (GLASS, {"gait.size": [1.0]}, "'size' is unknown"),
-        (GLASS, {"gait": [1.0]}, "name a parameter such as"),
+        (GLASS, {"gait": [1.0]}, "use a parameter such as"),
         (GLASS, {"effects.end-caps.radius": [0.1]}, "no effect 'end-caps'"),
         (GLASS, {"body.length": [1.0, -1.0]}, "length must be a number from"),
         (GLASS, {}, "must span 1 to"),
-        (BOTH, {"effects.grain-inertia.frequency": [2.0]}, "it is one swimmer"),
+        (
+            BOTH,
+            {"effects.grain-inertia.frequency": [2.0]},
+            "both (describe|belong to) one swimmer",
+        ),
         (BOTH, {"body.length": [0.2]}, r"\[body\] gives length = 0.2 and body-inertia"),
         (BOTH, {"effects.speed": [2.0]}, "no effect of the scene gives 'speed'"),
     ],

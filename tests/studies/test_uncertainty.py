@@ -178,7 +178,9 @@ WIDE = scene(Granular(1.49, 0.22, covariance=((4.0, 0.0), (0.0, 1e-4))))
     ],
 )
 def test_a_covariance_that_reaches_no_medium_is_refused(ask):
-    refused = r"\[medium\] covariance: a standard deviation away there is no medium"
+    refused = (
+        r"\[medium\] covariance: one standard deviation away the medium is not valid"
+    )
     with pytest.raises(Refusal, match=refused):
         ask()
 

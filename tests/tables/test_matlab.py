@@ -134,7 +134,7 @@ def struct_of(width, *parts):
     ],
 )
 def test_parts_that_do_not_fit_are_damage(data):
-    with pytest.raises(Refusal, match="damaged|cut short"):
+    with pytest.raises(Refusal, match="damaged|incomplete"):
         read(data)
 
 

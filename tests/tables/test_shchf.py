@@ -142,17 +142,21 @@ ONE_JOINT = {"A1": [0.0, 1.0], "B1": [0.0, 1.0]}
 @pytest.mark.parametrize(
     ("variables", "settings", "said"),
     [
-        ({"x": 1.0}, {}, "has no gait: one is alpha1, alpha2"),
+        ({"x": 1.0}, {}, "has no gait: a gait is alpha1, alpha2"),
         ({"A1": [0.0, 1.0], "B1": [0.0]}, {}, "has no gait"),
         ({"A1": [0.1], "B1": [0.0]}, {}, "has no gait"),
         ({"A1": [0.1, 1], "A2": [0.1, 1], "B1": [0.0, 5]}, {}, "has no gait"),
         ({"A2": [0.1, 1], "B2": [0.0, 5]}, {}, "has no gait"),
-        (ONE_JOINT, {"number": 2}, "has one gait, and no 2: drop number"),
-        ({"p": {"phi_def": 1.0}}, {}, "has no gait: .* function handles are not run"),
+        (ONE_JOINT, {"number": 2}, "has one gait, but no number 2: remove number"),
+        (
+            {"p": {"phi_def": 1.0}},
+            {},
+            "has no gait: .* function handles cannot be read",
+        ),
         (NO_PATH, {}, r"p.phi_locus_full\{1\} without shapes"),
-        (NO_PATH, {"number": 2}, "has 1 gaits, and no 2: take number = 1 to 1"),
-        (NO_PATH, {"number": 0}, "has 1 gaits, and no 0: take number = 1 to 1"),
-        (ONE_JOINT, {"sha256": "0"}, "is not the file whose sha256 is given"),
+        (NO_PATH, {"number": 2}, "has 1 gaits, but no number 2: use number = 1 to 1"),
+        (NO_PATH, {"number": 0}, "has 1 gaits, but no number 0: use number = 1 to 1"),
+        (ONE_JOINT, {"sha256": "0"}, "does not match sha256"),
     ],
 )
 def test_files_without_a_gait_are_refused(variables, settings, said, tmp_path):
@@ -183,13 +187,22 @@ SQUARE = {"alpha1": [0, 1, 1, 0], "alpha2": [0, 0, 1, 0], "t": [1, 2, 3, 4]}
     ("changes", "said"),
     [
         ({"alpha1": 31.42 * np.sin(T)}, "up to 31.42 where angles are in rad: convert"),
-        ({"alpha2": np.sin(T) + 2.1e-3 * T / T[-1]}, "do not close: .* is 0.0021 rad"),
-        ({"alpha1": [0, 1, 0], "alpha2": [0, 0, 0], "t": [1, 2, 3]}, "no four shapes"),
-        ({"t": [*T[:100], *T[99:-1]]}, "no four shapes or more at ascending times"),
-        ({"t": T[:9]}, "no four shapes or more at ascending times"),
-        ({"alpha2": np.sin(T[:-1])}, "no four shapes"),
-        ({"alpha2": np.nan * T}, r"has alpha2 that is not finite .* \(0, 0\): mend it"),
-        ({"alpha1": "words"}, "has alpha1 that is no array of real numbers"),
+        (
+            {"alpha2": np.sin(T) + 2.1e-3 * T / T[-1]},
+            "do not form a closed curve: .* is 0.0021 rad",
+        ),
+        (
+            {"alpha1": [0, 1, 0], "alpha2": [0, 0, 0], "t": [1, 2, 3]},
+            "not four or more shapes",
+        ),
+        ({"t": [*T[:100], *T[99:-1]]}, "not four or more shapes at increasing times"),
+        ({"t": T[:9]}, "not four or more shapes at increasing times"),
+        ({"alpha2": np.sin(T[:-1])}, "not four or more shapes"),
+        (
+            {"alpha2": np.nan * T},
+            r"has alpha2 that is not finite .* \(0, 0\): correct the file",
+        ),
+        ({"alpha1": "words"}, "has alpha1 that is not an array of real numbers"),
     ],
 )
 def test_points_that_make_no_gait_are_refused(changes, said, tmp_path):

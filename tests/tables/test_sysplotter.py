@@ -45,11 +45,13 @@ def test_a_struct_of_every_version_is_read(version, tmp_path):
     np.testing.assert_array_equal(table.stored.connection.A, computed()[0].A)
     np.testing.assert_array_equal(table.stored.computed.beta, computed()[3])
     assert (table.chain, table.assumed) == (SWIMMER.body, ())
-    with pytest.raises(Refusal, match="says the body's length itself, 1 BL: drop body"):
+    with pytest.raises(
+        Refusal, match="states the length of the body itself, 1 BL: leave body"
+    ):
         Table(table.file, body_length=0.3)
-    with pytest.raises(Refusal, match="says its body itself: drop the body"):
+    with pytest.raises(Refusal, match="describes its body itself: leave the body"):
         Table(table.file, body=rft.Chain())
-    with pytest.raises(Refusal, match="says sign and order itself: drop sign and"):
+    with pytest.raises(Refusal, match="defines sign and order itself: leave sign and"):
         Table(table.file, sign="-")
 
 
@@ -90,9 +92,9 @@ def test_a_struct_of_three_joints_is_read(tmp_path):
     ("change", "said"),
     [
         (lambda A: A, None),
-        (lambda A: -A, "of the other sign"),
+        (lambda A: -A, "with the opposite sign"),
         (lambda A: A[:, ::-1].swapaxes(-1, -2), "with alpha1 and alpha2 swapped"),
-        (lambda A: A[..., ::-1, ::-1], "with both axes mirrored"),
+        (lambda A: A[..., ::-1, ::-1], "with both axes reversed"),
         (
             lambda A: -A[..., ::-1, ::-1],
             "with angles, or y and heading, positive clockwise",
@@ -106,7 +108,9 @@ def test_a_connection_that_its_body_would_have_with_other_axes_is_noted(
     content = {"A_num": cell(-A, (3, 2)), "Avec": cell(A, (3, 2))}
     table = Table(write(tmp_path / "s.mat", vecfield={"eval": {"content": content}}))
     np.testing.assert_array_equal(table.stored.connection.A, A)
-    noted = f"its A is that of a body of links {said} (correlation 1.00, as it stands "
+    noted = (
+        f"its A resembles that of a body of links {said} (correlation 1.00; as read "
+    )
     assert [x.startswith(noted) for x in table.assumed] == [True] * bool(said)
 
 
@@ -256,15 +260,15 @@ def spoilt(value):
         (
             ("vecfield",),
             None,
-            "has no s.vecfield.eval.content.Avec: save it by sys_calc",
+            "has no s.vecfield.eval.content.Avec: save it with sys_calc",
         ),
-        (("grid", "eval"), None, "has no s.grid.eval: save it by"),
+        (("grid", "eval"), None, "has no s.grid.eval: save it with"),
         (
             ("grid", "eval"),
             np.ones((5, 4)),
-            "has s.grid.eval that is no cell of the gr",
+            "has s.grid.eval that is not a cell of gr",
         ),
-        (("grid", "eval"), lambda x: x[:1], "has s.grid.eval that is no cell"),
+        (("grid", "eval"), lambda x: x[:1], "has s.grid.eval that is not a cell"),
         (
             ("grid", "eval"),
             lambda x: -x,
@@ -278,32 +282,32 @@ def spoilt(value):
         (
             ("grid", "eval"),
             lambda x: cell(np.array([y.T for y in x.ravel()]), (2,)),
-            "has s.grid.eval{1} that does not change along dimension 1 alone: as nd",
+            "has s.grid.eval{1} that varies along other dimensions than dimension 1: only",
         ),
         (
             ("grid", "eval", (0, 0)),
             lambda x: x + 2e-9 * np.eye(5, 4),
-            "has s.grid.eval{1} that does not change along dimension 1 alone",
+            "has s.grid.eval{1} that varies along other dimensions than dimension 1",
         ),
         (
             ("grid", "eval", (0, 0)),
             spoilt(np.nan),
-            "has s.grid.eval{1} that is not finite (nan or inf) at (3, 4): mend it",
+            "has s.grid.eval{1} that is not finite (nan or inf) at (3, 4): correct the file",
         ),
         (
             ("grid", "eval", (1, 0)),
             np.ones((4, 5)),
-            "has s.grid.eval of shapes (5, 4),",
+            "has s.grid.eval of different shapes, (5, 4),",
         ),
         (
             (*CONTENT, "Avec"),
             lambda x: x[:2],
-            "has s.vecfield.eval.content.Avec that is no cell of 3 x 2 arrays: save it",
+            "has s.vecfield.eval.content.Avec that is not a cell of 3 x 2 arrays: save it",
         ),
         (
             (*CONTENT, "Avec", (2, 1)),
             np.ones((4, 5)),
-            "has s.vecfield.eval.content.Avec{3, 2} of shape (4, 5) where its grid mak",
+            "has s.vecfield.eval.content.Avec{3, 2} of shape (4, 5) where its grid req",
         ),
         (
             (*CONTENT, "Avec", (1, 0)),
@@ -320,7 +324,11 @@ def spoilt(value):
             cell(NEGATIVE * (1 + 1e-8), (3, 2)),
             "is damaged: s.vecf",
         ),
-        (("DA",), lambda x: x[:2], "has s.DA that is no cell of 3 x 1 arrays: save it"),
+        (
+            ("DA",),
+            lambda x: x[:2],
+            "has s.DA that is not a cell of 3 x 1 arrays: save it",
+        ),
         (
             (*METRIC, (0, 1)),
             lambda x: x + 1e-7,

@@ -156,16 +156,22 @@ def test_parts_that_a_netcdf_file_lacks_are_none(tmp_path):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (less("joint"), "holds no connection, joint is missing: write it anew"),
+        (less("joint"), "holds no connection, joint is missing: write it again"),
         (less("fit_residual"), "holds no connection, fit_residual is missing"),
-        (part("joint", ("joint", "k"), np.zeros((2, 1))), "has A over (component, jo"),
+        (
+            part("joint", ("joint", "k"), np.zeros((2, 1))),
+            "has A over the dimensions (component, jo",
+        ),
         (part("joint", ("k",), np.arange(3)), "holds no connection, alpha_3 is miss"),
-        (part("alpha_2", ("alpha_2",), AXES[1], units="rads"), "has alpha_2 in 'rads'"),
+        (
+            part("alpha_2", ("alpha_2",), AXES[1], units="rads"),
+            "has alpha_2 in the unit 'rads'",
+        ),
         (part("alpha_1", ("alpha_1",), 20 * AXES[0][::-1]), "has no grid: alpha_1 mu"),
         (part("alpha_1", ("alpha_1",), 57 * AXES[0]), "has alpha_1 up to 57 where an"),
         (
             both(less("A_error"), cut("A", np.s_[:, :1], ("component", "one", *GRID))),
-            "has A over (component, one, alpha_1, alpha_2) where it must be",
+            "has A over the dimensions (component, one, alpha_1, alpha_2); they must be",
         ),
         (
             both(
@@ -173,7 +179,7 @@ def test_parts_that_a_netcdf_file_lacks_are_none(tmp_path):
                 less("A_error"),
                 cut("A", np.s_[:, :1]),
             ),
-            "has A of shape (3, 1, 5, 4) where it must be (3, 2, ...), rows x, y, t",
+            "has A of shape (3, 1, 5, 4); it must be (3, 2, ...), with the rows x, y, t",
         ),
         (
             part("component", ("component",), ["theta", "y", "x"]),
@@ -185,36 +191,39 @@ def test_parts_that_a_netcdf_file_lacks_are_none(tmp_path):
         ),
         (put("A", (0, 1, 2, 3), np.inf), "has A that is not finite (nan or inf) at in"),
         (put("A", (0, 1, 2, 3), 2e9), "has A above 1e+09 at index (0, 1, 2, 3)"),
-        (attributes(length_unit="feet"), "has a body_length or length_unit that makes"),
+        (attributes(length_unit="feet"), "has a body_length or length_unit that is"),
         (attributes(body_length=1e9), "has a body_length"),
         (attributes(body_length=0), "has a body_length"),
         (attributes(body_length=[0.3, 0.3]), "has a body_length"),
         (attributes(body_length="1"), "has a body_length"),
         (attributes(interpolation=4), "has too few shapes for a spline of degree 4: w"),
-        (cut("harmonics", np.s_[:, :3]), "has harmonics of shape (3, 3, 5, 4) where i"),
+        (cut("harmonics", np.s_[:, :3]), "has harmonics of shape (3, 3, 5, 4); i"),
         (put("harmonics", (1, 2, 3, 0), np.nan), "has harmonics that is not finite"),
         (put("even_part", (1, 2, 3), np.nan), "has even_part that is not finite"),
         (
             cut("even_part", np.s_[:2], ("two", *GRID)),
-            "has even_part over (two, alpha_1, alpha_2) where it must be (component, a",
+            "has even_part over the dimensions (two, alpha_1, alpha_2); they must be (component, a",
         ),
         (
             cut("A_error", np.s_[:, :1], ("component", "one", *GRID)),
-            "has A_error over (component, one,",
+            "has A_error over the dimensions (component, one,",
         ),
         (put("A_error", (0, 1, 2, 3), -1e-9), "has A_error below 0 where it is half o"),
-        (cut("pair_joints", np.s_[:, ::-1]), "has pair_joints other than [[1, 2]]: wr"),
+        (
+            cut("pair_joints", np.s_[:, ::-1]),
+            "has pair_joints that differ from [[1, 2]]: wr",
+        ),
         (
             both(less("pair_joints"), cut("ccf_pairs", np.s_[[0, 0]])),
-            "has ccf_pairs of shape (2, 3, 5, 4) where it must be (1, 3, ...)",
+            "has ccf_pairs of shape (2, 3, 5, 4); it must be (1, 3, ...)",
         ),
         (put("ccf_pairs", (0, 2, 1, 1), np.nan), "has ccf_pairs that is not finite"),
-        (attributes(power_degree=100.0), "has a power_degree that makes no sense"),
+        (attributes(power_degree=100.0), "has a power_degree that is not valid"),
         (attributes(power_degree=0), "has a power_degree"),
         (attributes(power_degree=[1.0, 2.0]), "has a power_degree"),
         (
             cut("norm", np.s_[:4]),
-            "has a norm of shape (4, 5, 4) where it must be (an odd number, ...) of",
+            "has a norm of shape (4, 5, 4); it must be (an odd number, ...) of",
         ),
         (
             part(
@@ -222,7 +231,7 @@ def test_parts_that_a_netcdf_file_lacks_are_none(tmp_path):
                 ("joint", "other_joint", *GRID),
                 np.reshape([[1, 0.5], [0.6, 1]], (2, 2, 1, 1)) * np.ones((5, 4)),
             ),
-            "has a metric of shape (2, 2, 5, 4) where it must be (2, 2, ...) and symm",
+            "has a metric of shape (2, 2, 5, 4); it must be (2, 2, ...) and symm",
         ),
         (
             masked("A", "fit_residual", "speed", "A_error"),
@@ -309,9 +318,7 @@ def test_parts_of_a_gait_are_where_they_belong(sign, turn, tmp_path):
     assert (found.level, found.factor) == (0.9, 2.1)
 
 
-UNFIT = (
-    "has a gait whose parts do not fit each other: write it anew with 'geomech fit-g"
-)
+UNFIT = "has a gait whose parts do not match: write it again with 'geomech fit-g"
 EVEN = {
     "gait_A": np.ones((3, 2, 4)),
     "gait_slope": np.ones((3, 2, 1, 4)),
@@ -325,10 +332,14 @@ EVEN = {
         (
             {"gait_A": np.ones((3, 2))},
             {},
-            "has a gait, but no gait_A that fits it: wri",
+            "has a gait, but no gait_A that matches it: wri",
         ),
         ({"gait_spread": None}, {}, "has a gait, but no gait_spread"),
-        ({"gait": np.ones((2, 1))}, {}, "has a gait that does not move: write it anew"),
+        (
+            {"gait": np.ones((2, 1))},
+            {},
+            "has a gait that does not move: write it again",
+        ),
         ({"gait": np.zeros((2, 3))}, {}, "has a gait that does not move"),
         ({"gait": np.ones((2, 4))}, {}, UNFIT),
         ({"gait_A": np.ones((2, 2, 5))}, {}, UNFIT),
@@ -426,20 +437,20 @@ def test_what_a_matlab_file_does_not_state_is_the_usual(tmp_path):
     [
         (
             ROWS,
-            "has alpha1 and alpha2 as rows, which leave the order open: say order =",
+            "has alpha1 and alpha2 as rows, which do not determine the order of the arrays: add order =",
         ),
         (
             {"Ay2": PLAIN[:, :3]},
-            "has Ay2 of shape (5, 3) where alpha1 and alpha2 make ",
+            "has Ay2 of shape (5, 3) where alpha1 and alpha2 req",
         ),
         ({"Ax1": np.full((5, 4), np.nan)}, "has Ax1 that is not finite"),
-        ({"Ax1": np.full((5, 4), 1j)}, "has Ax1 that is no array of real numbers"),
-        ({"Ax1": "text"}, "has Ax1 that is no array of real numbers"),
-        ({"Ax1": {"a": 1}}, "has Ax1 that is no array of real numbers"),
+        ({"Ax1": np.full((5, 4), 1j)}, "has Ax1 that is not an array of real numbers"),
+        ({"Ax1": "text"}, "has Ax1 that is not an array of real numbers"),
+        ({"Ax1": {"a": 1}}, "has Ax1 that is not an array of real numbers"),
         (dict.fromkeys(ENTRIES, 0 * PLAIN), "has a connection that is zero everywhere"),
         (
             {"alpha1": PLAIN[:, :3]},
-            "has alpha1 (5, 3) and alpha2 (5, 4), which span no",
+            "has alpha1 (5, 3) and alpha2 (5, 4), which do not form a",
         ),
         (
             {"alpha1": np.ones((3, 3, 3))},
@@ -451,31 +462,31 @@ def test_what_a_matlab_file_does_not_state_is_the_usual(tmp_path):
         ),
         (
             {"alpha1": PLAIN},
-            "has alpha1 and alpha2 that span no grid: one must change ",
+            "has alpha1 and alpha2 that do not form a grid: one must change ",
         ),
         (
             {"alpha1": AXES[0][:, None] + 2e-9 * np.arange(4)},
-            "has alpha1 and alpha2 that span no grid",
+            "has alpha1 and alpha2 that do not form a grid",
         ),
         (
             {"alpha1": 6.4 * AXES[0][:, None] + 0 * PLAIN},
-            "has alpha1 up to 6.4 where angles are in rad: convert it if these are deg",
+            "has alpha1 up to 6.4 where angles are in rad: convert them to rad if these are deg",
         ),
         (
             {"M11": 0.25 / (1 + PLAIN)},
-            "has M11, M12 and M22 that are no metric at index",
+            "has M11, M12 and M22 that do not form a metric at index",
         ),
         (
             {"M11": -1 - PLAIN, "M22": -1 - PLAIN},
-            "has M11, M12 and M22 that are no met",
+            "has M11, M12 and M22 that do not form a met",
         ),
         (
             {"M22": 0 * PLAIN},
-            "has M11, M12 and M22 that are no metric at index (0, 0): ",
+            "has M11, M12 and M22 that do not form a metric at index (0, 0): ",
         ),
         (
             {"M12": PLAIN[:4]},
-            "has M12 of shape (4, 4) where alpha1 and alpha2 make it ",
+            "has M12 of shape (4, 4) where alpha1 and alpha2 require ",
         ),
         (
             {"geomech_A_error": np.ones((3, 2, 4, 5))},
@@ -499,7 +510,7 @@ def test_parts_of_a_matlab_file_that_do_not_fit_are_refused(changes, said, tmp_p
 
 def test_a_connection_without_x_does_not_tell_its_sign(tmp_path):
     matlab(tmp_path / "a.mat", {"Ax1": 0 * PLAIN, "Ax2": 0 * PLAIN})
-    assert_refused(tmp_path / "a.mat", "does not tell the sign of A: say sign = '+'")
+    assert_refused(tmp_path / "a.mat", "does not state the sign of A: add sign = '+'")
 
 
 @pytest.mark.parametrize(

@@ -150,7 +150,7 @@ def test_the_sign_of_a_bare_mat_file_is_made_out(frame, medium, tmp_path):
         plain_mat(tmp_path / "a.mat", c, factor, order)
         held = tables.load(tmp_path / "a.mat")
         assert (held.sign, held.order) == (sign, order)
-        assert "its sign is made out as xi = " + sign in held.assumptions[-1]
+        assert "its sign was inferred as xi = " + sign in held.assumptions[-1]
         np.testing.assert_array_equal(held.connection.A, c.A)
 
 

@@ -187,7 +187,7 @@ REFUSED = [
     (lambda: Aeration(0.03, 0.03), r"the ground is fluidised from 0\.03 m/s on"),
     (lambda: Slope(0.5, 0.5), r"slides by itself.* angle of repose, 28\.6 degrees"),
     (lambda: DisturbedGround((), 0.02, 0.1), "must be"),
-    (lambda: ground_of([Aeration(0.01, 0.03)] * 2), "aeration stands twice"),
+    (lambda: ground_of([Aeration(0.01, 0.03)] * 2), "aeration appears twice"),
     (lambda: loads(MAP, FLAT, POSE, TWIST, Slope(0.1)), "a list of effects such as"),
 ]
 

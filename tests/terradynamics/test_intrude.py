@@ -197,13 +197,13 @@ def test_what_is_written_reads_the_same(scene):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "header must be t,x,z, and angle if wanted"),
+        ("", "header must be t,x,z, and angle if needed"),
         ("t,x,y\n0,0,0\n", "line 1: the header must be t,x,z"),
         ("t,x,z,z\n0,0,0,0\n", "line 1: the header has 2 columns z"),
         ("t,x,z\n0,0,0\n1,1\n2,2,0\n", "line 3: a row must be 3 finite numbers"),
         ("t,x,z\n0,0,0\n1,nan,0\n", "line 3: a row must be 3 finite numbers"),
-        ("t,x,z\n0,0,0\n1,1,0\n", "a path takes 3 to 100000 poses, got 2"),
-        ("t,x,z\n0,0,0\n1,1,0\n1,2,0\n", "t must ascend"),
+        ("t,x,z\n0,0,0\n1,1,0\n", "a path must have 3 to 100000 poses, got 2"),
+        ("t,x,z\n0,0,0\n1,1,0\n1,2,0\n", "t must increase"),
         ("t,x,z\n0,0,0\n1,5000,0\n2,2,0\n", "x must be finite and within 1000 m"),
     ],
 )

@@ -213,10 +213,22 @@ def test_faces_name_vertices_from_the_first_or_the_last(kind, last, tmp_path):
 @pytest.mark.parametrize(
     ("kind", "last", "said"),
     [
-        ("ply", "3 1 2 4\n", "a face names vertex 4, where vertices are 0 to 3"),
-        ("ply", "3 1 2 -1\n", "a face names vertex -1, where vertices are 0 to 3"),
-        ("ply", "4 1 2 -4 3\n", "a face names vertex -4, where vertices are 0 to 3"),
-        ("obj", "f -3 -2 -1\nv 5 5 5\n", "a face counts vertices back, and vertices"),
+        ("ply", "3 1 2 4\n", "a face names vertex 4, but vertices are numbered 0 to 3"),
+        (
+            "ply",
+            "3 1 2 -1\n",
+            "a face names vertex -1, but vertices are numbered 0 to 3",
+        ),
+        (
+            "ply",
+            "4 1 2 -4 3\n",
+            "a face names vertex -4, but vertices are numbered 0 to 3",
+        ),
+        (
+            "obj",
+            "f -3 -2 -1\nv 5 5 5\n",
+            "a face counts vertices backwards, but vertices",
+        ),
         ("obj", "f 2 3 5\n", "is no OBJ mesh: 'index 4 is out of bounds"),
         ("obj", "f 2 3 -5\n", "is no OBJ mesh: 'index -5 is out of bounds"),
         ("obj", "f 0//1 2//1 -1//1", "a face names vertex 0, where vertices count"),

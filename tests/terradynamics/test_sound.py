@@ -174,7 +174,7 @@ def test_two_bodies_stay_two(at, inside_out):
 )
 @pytest.mark.parametrize("make", [sound, Mesh])
 def test_parts_that_cross_or_touch_are_refused(parts, make):
-    with pytest.raises(Refusal, match="cross or touch"):
+    with pytest.raises(Refusal, match="intersect or touch"):
         make(*joined(*parts))
 
 

@@ -237,9 +237,12 @@ HOLLOW = np.concatenate([SIDES, SIDES[:, ::-1] + len(CUBE)])
 LINE = np.concatenate([SIDES[:-1], [(1, 1, 3)]])
 BALL = shapes.sphere(0.02, 1)
 REFUSED = [
-    (lambda: Mesh(CUBE, SIDES[:-1]), "open: 3 edges have one triangle; close it, as"),
+    (
+        lambda: Mesh(CUBE, SIDES[:-1]),
+        "open: 3 edges have only one triangle; close it, for",
+    ),
     (lambda: Mesh(CUBE, SIDES[:, ::-1]), "inside out: its normals point inwards"),
-    (lambda: Mesh(CUBE, TURNED), "run along the same way"),
+    (lambda: Mesh(CUBE, TURNED), "run along an edge of the mesh in the same direction"),
     (lambda: Mesh(CUBE, DOUBLED), "doubles"),
     (lambda: Mesh(WITHIN, HOLLOW), "lies inside"),
     (lambda: Mesh(CUBE, LINE), "no area"),

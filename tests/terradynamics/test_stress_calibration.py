@@ -140,15 +140,21 @@ def test_no_matter_how_a_plate_is_turned():
 
 
 SLIPPED = [
-    (lambda b, g, x, z: (b, g, z, x), "alpha_x and alpha_z are swapped"),
-    (lambda b, g, x, z: (g, b, x, z), "beta and gamma are swapped"),
-    (lambda b, g, x, z: (b, g, -x, z), "alpha_x has the other sign"),
-    (lambda b, g, x, z: (b, g, x, -z), "alpha_z has the other sign"),
-    (lambda b, g, x, z: (b, g, -x, -z), "both stresses have the other sign"),
-    (lambda b, g, x, z: (b, -g, x, z), "gamma has the other sign"),
-    (lambda b, g, x, z: (-b, g, x, z), "beta has the other sign"),
-    (lambda b, g, x, z: (90 * RAD - b, g, x, z), "beta is from the vertical"),
-    (lambda b, g, x, z: (b, 90 * RAD - g, x, z), "gamma is from the vertical"),
+    (lambda b, g, x, z: (b, g, z, x), "alpha_x and alpha_z were swapped"),
+    (lambda b, g, x, z: (g, b, x, z), "beta and gamma were swapped"),
+    (lambda b, g, x, z: (b, g, -x, z), "alpha_x had the opposite sign"),
+    (lambda b, g, x, z: (b, g, x, -z), "alpha_z had the opposite sign"),
+    (lambda b, g, x, z: (b, g, -x, -z), "both stresses had the opposite sign"),
+    (lambda b, g, x, z: (b, -g, x, z), "gamma had the opposite sign"),
+    (lambda b, g, x, z: (-b, g, x, z), "beta had the opposite sign"),
+    (
+        lambda b, g, x, z: (90 * RAD - b, g, x, z),
+        "beta were not measured from the vertical",
+    ),
+    (
+        lambda b, g, x, z: (b, 90 * RAD - g, x, z),
+        "gamma were not measured from the vertical",
+    ),
 ]
 assert len(SLIPPED) == len(MISTAKES)
 
@@ -157,7 +163,9 @@ assert len(SLIPPED) == len(MISTAKES)
 @pytest.mark.parametrize("stress", [StressMap(zeta=0.3), CLOSE])
 def test_slips_of_columns_and_signs_are_named(slip, said, stress):
     drags = noisy(stress, np.random.default_rng(5), 0.01, GRID)
-    with pytest.raises(ValueError, match=f"like those of no grains.*{said}"):
+    with pytest.raises(
+        ValueError, match=f"do not resemble those of any grains.*{said}"
+    ):
         fit_stress(*slip(*drags))
 
 
@@ -211,15 +219,17 @@ DEPTHS = [0.01, 0.02, 0.03]
 FORCES = [1.0, 2.0, 3.0]
 REFUSED = {
     "3 to 100000 depths below the surface": lambda: fit_zeta([-1.0] * 3, FORCES, 1.0),
-    "the force is against the law": lambda: fit_zeta(DEPTHS, [-1.0] * 3, 1e-3),
-    "no grains (0.01 to 100): check the units, depth": lambda: fit_zeta(
+    "the force has the wrong sign for the law": lambda: fit_zeta(
+        DEPTHS, [-1.0] * 3, 1e-3
+    ),
+    "the range of grains (0.01 to 100): check the units, depth": lambda: fit_zeta(
         DEPTHS, FORCES, 1e-9
     ),
     "area of the plate must be above 0": lambda: fit_zeta(DEPTHS, FORCES, [1, 0, 1]),
     "must be finite": lambda: fit_zeta([0.01, np.nan, 0.03], FORCES, 1e-3),
-    "depth and force must be equally many": lambda: fit_zeta([0.01], FORCES, 1e-3),
+    "depth and force must have the same length": lambda: fit_zeta([0.01], FORCES, 1e-3),
     "area must be one number": lambda: fit_zeta(DEPTHS, FORCES, [1e-3] * 2),
-    "equally many numbers": lambda: fit_stress([0.1], [0.1, 0.2], [1], [1]),
+    "the same length": lambda: fit_stress([0.1], [0.1, 0.2], [1], [1]),
     "must be a whole number from 6": lambda: fit_stress(*[[0.1] * 5] * 4),
     "the plate drags are all 0": lambda: fit_stress(*GRID, 0 * GRID[0], 0 * GRID[0]),
 }
@@ -301,8 +311,8 @@ def pushed(file, head="# area = 9.5e-4", scale=1.0):
 
 
 SLIPS_OF_UNITS = {
-    "beta and gamma look like radians": lambda file: plates(file, angle_unit=1.0),
-    "1e-6 of those in N/m^3": lambda file: plates(file, scale=1e6),
+    "beta and gamma appear to be in radians": lambda file: plates(file, angle_unit=1.0),
+    "1e-6 of the value in N/m^3": lambda file: plates(file, scale=1e6),
     "depth in m": lambda file: pushed(file, scale=1e3),
     "force in N, area in m^2": lambda file: pushed(file, "# area = 9.5"),
     "give areas 0.0009 and 0.0012 m^2": lambda file: pushed(

@@ -405,17 +405,20 @@ FLAT = OUTLINES["plate"].outline()
 LOOP = [(0.026, 0), (0.003, 0.029), (-0.009, 0.023), (0.021, 0.043), (-0.039, 0.023)]
 REFUSED = [
     (lambda: PlateDrags(*[[0] * 5] * 4), "plate drags must be 6 to 5000, got 5"),
-    (lambda: PlateDrags([0, 1], [0], [0], [0]), "must be equally many"),
-    (lambda: PlateDrags(*[LINE] * 4), "no plate drag within 35 degrees of beta"),
+    (lambda: PlateDrags([0, 1], [0], [0], [0]), "must have the same length"),
+    (lambda: PlateDrags(*[LINE] * 4), "no plate drag lies within 35 degrees of beta"),
     (lambda: Wheel(0.1, 0.1, 40, 0.01, 0.02), "lug_width must be below 0.0157 m"),
     (lambda: Wheel(0.1, 0.1, lug_height=0.01), "need lugs"),
-    (lambda: Polygon(BOWTIE, 0.1), r"elements \[0\] and \[2\] of the outline cross"),
+    (
+        lambda: Polygon(BOWTIE, 0.1),
+        r"elements \[0\] and \[2\] of the outline intersect",
+    ),
     (lambda: Polygon(TOUCHES, 0.1), "cross or touch"),
-    (lambda: Spline(LOOP, 0.1), r"elements \[3\] and \[6\] of the outline cross"),
+    (lambda: Spline(LOOP, 0.1), r"elements \[3\] and \[6\] of the outline intersect"),
     (lambda: Polygon([(0, 0), (1, 0), (0.5, 0)], 0.1, closed=False), "turns back onto"),
     (lambda: Rotate(0.02, rate=0.0), "rate must not be 0"),
-    (lambda: Path([0, 2, 1], [0, 1, 2], [0, 1, 2]), "t must ascend, but t = 2"),
-    (lambda: Path([0, 1, 2], [0, 1], [0, 1, 2]), "equally many"),
+    (lambda: Path([0, 2, 1], [0, 1, 2], [0, 1, 2]), "t must increase, but t = 2"),
+    (lambda: Path([0, 1, 2], [0, 1], [0, 1, 2]), "the same length"),
     (lambda: loads(M0, FLAT, (0, 0), (1, 0, 0)), r"pose must have shape \(..., 3\)"),
     (lambda: loads(M0, FLAT, (0, 0, 0), (1, np.nan, 0)), "twist must be finite"),
 ]

@@ -176,7 +176,8 @@ def differs(old: list[str], new: list[str]) -> str:
 CURE = re.compile(  # words of a cure, or of what a value must be
     r"\?$|did you mean|\b(must|such as|possible|takes?|use|give|say|add|put|write|raise|lower|widen|leave|drop|keep|choose"
     r"|name|close|check|install|wait|start|turn|split|end|see|mend|clean|shrink|convert|restore|rename|copy|needs?|belongs"
-    r"|from|only|at least|at most|one of|in place of|it has|too few|order|below|above|beyond|within)\b",
+    r"|from|only|at least|at most|one of|in place of|it has|too few|order|below|above|beyond|within"
+    r"|remove|correct|reduce|call|list|optimize|the \w+ are)\b",
     re.I,
 )
 ORDINARY = {  # words of a sentence as much as of a scene

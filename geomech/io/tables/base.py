@@ -176,7 +176,7 @@ def checked_axis(
     if np.abs(axis).max() > largest:
         raise Refusal(
             f"has {name} up to {np.abs(axis).max():.4g} where angles are in rad",
-            instead="convert it if these are degrees",
+            instead="convert them to rad if these are degrees",
         )
     return axis
 
@@ -207,19 +207,19 @@ def checked_numbers(name: str, values: Any) -> np.ndarray:
     numbers, not finite, or too large."""
     array = np.asarray(values)
     if array.dtype.kind not in "iuf":
-        raise Refusal(f"has {name} that is no array of real numbers")
+        raise Refusal(f"has {name} that is not an array of real numbers")
     array = array.astype(float)
     is_bad = ~np.isfinite(array)
     if is_bad.any():
         raise Refusal(
             f"has {name} that is not finite (nan or inf) at {_first_index(is_bad)}",
-            instead="mend it",
+            instead="correct the file",
         )
     is_large = np.abs(array) > LARGEST_ENTRY
     if is_large.any():
         raise Refusal(
             f"has {name} above {LARGEST_ENTRY:g} at {_first_index(is_large)}",
-            instead="mend it",
+            instead="correct the file",
         )
     return array
 
@@ -238,7 +238,7 @@ def check_mask(
         checked_numbers(name, values)
     if not np.isnan(values[..., masked]).all():
         raise Refusal(
-            f"has {name} at singular shapes, where A is nan", instead="write it anew"
+            f"has {name} at singular shapes, where A is nan", instead="write it again"
         )
     checked_numbers(name, np.where(masked, 0.0, values))
 
@@ -319,6 +319,8 @@ def detected_sign(connection: Connection) -> str:
     if (x_of_minus < -least).all() and (x_of_plus > least).all():
         return "-"
     raise Refusal(
-        "does not tell the sign of A",
-        instead="say sign = '+' for xi = + A alphadot, '-' for xi = - A alphadot",
+        "does not state the sign of A",
+        instead=(
+            "add sign = '+' for xi = + A alphadot, or sign = '-' for xi = - A alphadot"
+        ),
     )

@@ -80,18 +80,19 @@ def _pose(stored: Stored, frame: str, chain: Any) -> tuple[np.ndarray, np.ndarra
     c = stored.connection
     if isinstance(c, Tube):
         raise Refusal(
-            f"a table near a measured gait keeps its frame, {stored.frame!r}",
-            instead="drop frame",
+            f"a table near a measured gait has only the frame {stored.frame!r}",
+            instead="remove frame",
         )
     if frame == MINIMUM_PERTURBATION:
         field = minimum_perturbation(c)
         return np.moveaxis(field.field.values, 0, -1), field.grid_slopes
     if chain is None or stored.frame != chain.frame:
-        cure = f"drop frame, or take {MINIMUM_PERTURBATION!r}"
+        cure = f"remove frame, or use {MINIMUM_PERTURBATION!r}"
         if chain is None:
-            cure += ", or add [system.body], with the frame that A has"
+            cure += ", or add [system.body]in the frame of A"
         raise Refusal(
-            f"no frame {frame!r} of a table whose frame is {stored.frame!r}",
+            f"a table in the frame {stored.frame!r} cannot be converted to the "
+            f"frame {frame!r}",
             instead=cure,
         )
     alpha = np.stack(np.meshgrid(*c.axes, indexing="ij"), -1)

@@ -16,8 +16,8 @@ from geomech.io.tables.matlab import DEEPEST, LARGEST
 from rft.core.refusal import Refusal
 
 MOST_NODES = 5_000  # some seconds of reading; files of sysplotter have some hundreds
-CURE = "pip install 'geomech[hdf5]', or save it in MATLAB by save(FILE, ..., '-v7')"
-ANEW = "save it in MATLAB again, by save(FILE, ..., '-v7')"
+CURE = "pip install 'geomech[hdf5]', or save it in MATLAB with save(FILE, ..., '-v7')"
+ANEW = "save it in MATLAB again with save(FILE, ..., '-v7')"
 
 
 def arrays(raw: bytes, names: Collection[str]) -> dict[str, Any]:
@@ -28,7 +28,7 @@ def arrays(raw: bytes, names: Collection[str]) -> dict[str, Any]:
     except ImportError:
         raise Refusal(
             "is a MATLAB 7.3 (HDF5) file",
-            because="the package h5py, which reads it, is missing",
+            because="the package h5py, which is needed to read it, is not installed",
             instead=CURE,
         ) from None
     try:
@@ -43,7 +43,7 @@ def arrays(raw: bytes, names: Collection[str]) -> dict[str, Any]:
         raise
     except Exception:  # HDF5 raises errors of all kinds for a damaged file
         raise Refusal(
-            "is a damaged MATLAB 7.3 (HDF5) file, or cut short", instead=ANEW
+            "is a damaged MATLAB 7.3 (HDF5) fileor incomplete", instead=ANEW
         ) from None
 
 
@@ -88,7 +88,7 @@ class Reader:
         """Refusal unless ``count`` nodes may still be met."""
         if self.nodes_left < count:
             reason = f"it has more than {MOST_NODES:,} cells and fields"
-            raise Refusal("is too large, or damaged", because=reason, instead=ANEW)
+            raise Refusal("is too large or damaged", because=reason, instead=ANEW)
 
     def _value(self, node: Any, place: str, depth: int) -> Any:
         """Return the value of a node that is met for the first time."""
@@ -96,7 +96,7 @@ class Reader:
 
         if not depth:
             raise Refusal(
-                f"is damaged at {place}", because="it lies in itself", instead=ANEW
+                f"is damaged at {place}", because="it contains itself", instead=ANEW
             )
         if "MATLAB_object_decode" in node.attrs:
             return None
@@ -119,7 +119,7 @@ class Reader:
         last, as the first."""
         self.bytes_left -= node.size * node.dtype.itemsize
         if self.bytes_left < 0:
-            raise Refusal(f"is too large, or damaged, at {place}", instead=ANEW)
+            raise Refusal(f"is too large, or is damaged at {place}", instead=ANEW)
         return np.asarray(node[()]).T
 
     def _cell(self, references: np.ndarray, place: str, depth: int) -> np.ndarray:

@@ -57,7 +57,7 @@ OPTIONAL = ("singular_shapes", "level", "body", "power_degree")
 ABOUT = "geomech_about"
 RESIDUAL = "geomech_fit_residual"
 ERROR = "geomech_A_error"
-SAVE = "save it in MATLAB by save(FILE, ..., '-v7')"
+SAVE = "save it in MATLAB with save(FILE, ..., '-v7')"
 
 
 def write(
@@ -163,13 +163,13 @@ def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
 
     assumptions: tuple[str, ...] = ()
     if contents[ANGLES[0]].ndim > 1 and order == "meshgrid":
-        assumptions += ("its arrays run as meshgrid's",)
+        assumptions += ("its arrays are ordered as by meshgrid",)
     if not sign and about.get("sign") in SIGNS:
         sign = about["sign"]
     if not sign:
         sign = detected_sign(connection)
         assumptions += (
-            f"its sign is made out as {SIGNS[sign]}; say sign = '+' or '-' if you "
+            f"its sign was inferred as {SIGNS[sign]}; add sign = '+' or '-' if you "
             "know it",
         )
     if sign == "-":
@@ -203,7 +203,8 @@ def variables(raw: bytes, names: Collection[str]) -> dict[str, Any]:
         return hdf5.arrays(raw, names)
     if raw[:3] == b"CDF":
         raise Refusal(
-            "is no MATLAB file, but a NetCDF one", instead="end its name in .nc"
+            "is a NetCDF file, not a MATLAB file",
+            instead="change the ending of its name to .nc",
         )
     try:
         if raw[:4] and 0 in raw[:4]:
@@ -211,7 +212,7 @@ def variables(raw: bytes, names: Collection[str]) -> dict[str, Any]:
         return matlab.arrays(raw)
     except ValueError:
         raise Refusal(
-            "is damaged, cut short, or no MATLAB file", instead=SAVE
+            "is damaged, incomplete, or not a MATLAB file", instead=SAVE
         ) from None
 
 
@@ -223,11 +224,14 @@ def _check_layout(contents: dict) -> None:
             layout = ", ".join((*ANGLES, *ENTRIES))
             raise Refusal(
                 f"has no {name}",
-                because=f"a connection is {layout}, or sysplotter's struct s",
+                because=(
+                    f"a file with a connection has {layout}, or the struct s of "
+                    "sysplotter"
+                ),
             )
         values = contents[name]
         if not isinstance(values, np.ndarray) or values.dtype == object:
-            raise Refusal(f"has {name} that is no array of real numbers")
+            raise Refusal(f"has {name} that is not an array of real numbers")
 
 
 def _read_version_4(raw: bytes, names: Collection[str]) -> dict[str, np.ndarray]:
@@ -250,24 +254,28 @@ def _axes(contents: dict, order: str) -> tuple[tuple[np.ndarray, np.ndarray], st
     if first.ndim == second.ndim == 2 and min(*first.shape, *second.shape) == 1:
         if not order:
             raise Refusal(
-                "has alpha1 and alpha2 as rows, which leave the order open",
-                instead="say order = 'ndgrid' or 'meshgrid'",
+                "has alpha1 and alpha2 as rows, which do not determine the order "
+                "of the arrays",
+                instead="add order = 'ndgrid' or 'meshgrid'",
             )
         return _checked_axes(contents, first.ravel(), second.ravel()), order
     if first.ndim != 2 or first.shape != second.shape:
         raise Refusal(
-            f"has alpha1 {first.shape} and alpha2 {second.shape}, which span no grid"
+            f"has alpha1 {first.shape} and alpha2 {second.shape}, which do not "
+            "form a grid"
         )
     for name in ORDERS:
         a = _as_ndgrid(first, name)
         b = _as_ndgrid(second, name)
         if max(np.ptp(a, axis=1).max(), np.ptp(b, axis=0).max()) <= 1e-9:
             if order not in ("", name):
-                raise Refusal(f"has arrays that run as {name}'s", instead="drop order")
+                raise Refusal(
+                    f"has arrays in the order of {name}", instead="remove order"
+                )
             return _checked_axes(contents, a[:, 0], b[0]), name
     raise Refusal(
-        "has alpha1 and alpha2 that span no grid",
-        because="one must change along rows alone, the other along columns",
+        "has alpha1 and alpha2 that do not form a grid",
+        because="one must change along rows only, the other along columns",
     )
 
 
@@ -329,7 +337,7 @@ def _entries(
             values = checked_numbers(name, values)
         if values.shape != expected:
             raise Refusal(
-                f"has {name} of shape {values.shape} where alpha1 and alpha2 make it "
+                f"has {name} of shape {values.shape} where alpha1 and alpha2 require "
                 f"{expected}"
             )
         arrays.append(_as_ndgrid(values, order).astype(float))
@@ -379,7 +387,7 @@ def _metric(
     for name, values in zip(METRIC, entries):
         if values.shape != shape:
             raise Refusal(
-                f"has {name} of shape {values.shape} where alpha1 and alpha2 make it "
+                f"has {name} of shape {values.shape} where alpha1 and alpha2 require "
                 f"{shape}"
             )
     a, b, c = entries
@@ -387,8 +395,8 @@ def _metric(
     if indefinite.any():
         place = ", ".join(map(str, np.argwhere(indefinite)[0]))
         raise Refusal(
-            f"has M11, M12 and M22 that are no metric at index ({place})",
-            because="it must be positive definite",
+            f"has M11, M12 and M22 that do not form a metric at index ({place})",
+            because="the matrix must be positive definite",
         )
     power = about.get("power_degree")
     power = power if isinstance(power, float) and 0 < power < 100 else None

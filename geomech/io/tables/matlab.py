@@ -67,7 +67,7 @@ class Source:
             if self.elements_left < 0:
                 raise Refusal(f"it has more than {MOST:,} parts")
             if k + 8 > len(data):
-                raise Refusal("cut short")
+                raise Refusal("it is incomplete")
             kind, size = struct.unpack_from(f"{self.order}II", data, k)
             small_size = kind >> 16
             if small_size:  # up to four bytes, in the place of the size
@@ -80,7 +80,7 @@ class Source:
                 start = k + 8
                 step = 8 + size + padding
             if small_size > 4 or start + size > len(data):
-                raise Refusal("cut short")
+                raise Refusal("it is incomplete")
             yield kind, data[start : start + size]
             k += step
 
@@ -92,7 +92,7 @@ def arrays(raw: bytes, largest: int = LARGEST) -> dict[str, Any]:
     orders = {b"\x00\x01IM": "<", b"\x01\x00MI": ">"}
     order = orders.get(raw[124:HEADER])
     if order is None:
-        raise Refusal("no MATLAB file of version 5 to 7")
+        raise Refusal("not a MATLAB file of version 5 to 7")
     variables = {}
     bytes_left = largest
     source = Source(order)
@@ -116,7 +116,7 @@ def _inflated(data: memoryview, largest: int) -> memoryview:
     except zlib.error:
         raise Refusal("damaged") from None
     if not stream.eof or len(inflated) >= largest:
-        raise Refusal("cut short, or too large")
+        raise Refusal("incomplete or too large")
     return inflated
 
 

@@ -36,8 +36,8 @@ from geomech.mathematics.geometry.representations.harmonics import Harmonics
 from geomech.mathematics.geometry.representations.tube import Loop, TaylorSeries, Tube
 from rft.core.refusal import Refusal
 
-SOURCE = "write it anew with 'geomech connection SCENE -o FILE.nc'"
-FITTED = "write it anew with 'geomech fit-gait LOG.csv -o FILE.nc'"
+SOURCE = "write it again with 'geomech connection SCENE -o FILE.nc'"
+FITTED = "write it again with 'geomech fit-gait LOG.csv -o FILE.nc'"
 UNITS = {"body length": "BL", "BL": "BL", "m": "m"}
 ANGLES = ("rad", "radian", "radians")
 SHAPE = "shape variable "  # before the name of one that is no angle between links
@@ -58,7 +58,7 @@ def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
     if raw[:4] not in (b"CDF\x01", b"CDF\x02"):
         raise Refusal(_other_format(raw))
     if order not in ("", "ndgrid"):
-        raise Refusal("names its dimensions", instead="drop order")
+        raise Refusal("names its dimensions", instead="remove order")
     contents = _read(raw)
     stored = _stored(contents, sign, sha256)
     names = contents.axis_names
@@ -112,8 +112,8 @@ class _Contents:
         for name in self.axis_names:
             if self.units[name] not in ("", *ANGLES):
                 raise Refusal(
-                    f"has {name} in {self.units[name]!r}",
-                    because="shapes are angles in rad",
+                    f"has {name} in the unit {self.units[name]!r}",
+                    because="shapes must be angles in rad",
                 )
         return tuple(
             checked_axis(name, self.variables[name][1]) for name in self.axis_names
@@ -130,7 +130,7 @@ class _Contents:
         expected = (*lead, *self.axis_names)
         if dims != expected:
             raise Refusal(
-                f"has {name} over ({', '.join(dims)}) where it must be "
+                f"has {name} over the dimensions ({', '.join(dims)}); they must be "
                 f"({', '.join(expected)})",
                 instead=SOURCE,
             )
@@ -181,7 +181,7 @@ def _read(raw: bytes) -> _Contents:
                 if not name.startswith("_"):
                     attributes[name] = value
     except Exception:  # SciPy raises errors of all kinds for a damaged file
-        raise Refusal("is damaged or cut short", instead=SOURCE) from None
+        raise Refusal("is damaged or incomplete", instead=SOURCE) from None
     return _Contents(variables, units, attributes, labels)
 
 
@@ -193,8 +193,10 @@ def _other_format(raw: bytes) -> str:
             "to_netcdf(..., format='NETCDF3_64BIT')"
         )
     if raw[:6] == b"MATLAB":
-        return "is no NetCDF file, but a MATLAB one: end its name in .mat"
-    return f"is no NetCDF file: {SOURCE}"
+        return (
+            "is a MATLAB file, not a NetCDF file: change the ending of its name to .mat"
+        )
+    return f"is not a NetCDF file: {SOURCE}"
 
 
 def _text(value: Any) -> str:
@@ -280,8 +282,8 @@ def _checked_entries(contents: _Contents) -> tuple[np.ndarray, np.ndarray]:
         or not _has_standard_rows(contents)
     ):
         raise Refusal(
-            f"has A of shape {A.shape} where it must be (3, {joints}, ...), "
-            "rows x, y, theta"
+            f"has A of shape {A.shape}; it must be (3, {joints}, ...), with the rows "
+            "x, y, theta"
         )
     masked = np.isnan(A).any((0, 1))
     check_mask("A", A, masked, contents.attributes)
@@ -318,7 +320,7 @@ def _checked_length(attributes: Mapping) -> tuple[float, str]:
     unit = UNITS.get(_text(attributes.get("length_unit", b"body length")))
     if unit is None or not is_real_number(length) or not 0 < length < 1e9:
         raise Refusal(
-            "has a body_length or length_unit that makes no sense", instead=SOURCE
+            "has a body_length or length_unit that is not valid", instead=SOURCE
         )
     return float(length), unit
 
@@ -354,8 +356,7 @@ def _harmonics(
     has_pairs = rows.size > 0 and rows.shape[1] % 2 == 0
     if rows.shape[0] != 3 or residual.shape[0] != 3 or not has_pairs:
         raise Refusal(
-            f"has harmonics of shape {rows.shape} where it must be "
-            "(3, an even number, ...)"
+            f"has harmonics of shape {rows.shape}; it must be (3, an even number, ...)"
         )
     return Harmonics(
         contents.axes,
@@ -370,7 +371,7 @@ def _taylor_series(contents: _Contents, factor: float) -> TaylorSeries:
     (`geomech.mathematics.geometry.representations.tube`), with A times ``factor``."""
     for name, count in TAYLOR_VARIABLES.items():
         if name not in contents or contents.variables[name][1].ndim != count:
-            raise Refusal(f"has a gait, but no {name} that fits it", instead=FITTED)
+            raise Refusal(f"has a gait, but no {name} that matches it", instead=FITTED)
     gait, A, slope, errors, spread, beyond = map(contents.values, TAYLOR_VARIABLES)
     d = len(gait)
     terms = A.shape[-1]
@@ -395,7 +396,7 @@ def _taylor_series(contents: _Contents, factor: float) -> TaylorSeries:
         and 0 < error_factor < 1e6
     )
     if not fits:
-        raise Refusal("has a gait whose parts do not fit each other", instead=FITTED)
+        raise Refusal("has a gait whose parts do not match", instead=FITTED)
     if d < 2 or not np.abs(gait[:, 1:]).max(initial=0.0) > 0:
         raise Refusal("has a gait that does not move", instead=FITTED)
     return TaylorSeries(
@@ -434,7 +435,7 @@ def _metric(
         return None, None
     if power_degree is not None:
         if not is_real_number(power_degree) or not 0 < power_degree < 100:
-            raise Refusal("has a power_degree that makes no sense", instead=SOURCE)
+            raise Refusal("has a power_degree that is not valid", instead=SOURCE)
         power_degree = float(power_degree)
     if "metric" in contents:
         return _quadratic_metric(contents, degree), power_degree
@@ -449,8 +450,8 @@ def _quadratic_metric(contents: _Contents, degree: int) -> Metric:
         M, M.swapaxes(0, 1), rtol=0, atol=rounding
     ):
         raise Refusal(
-            f"has a metric of shape {M.shape} where it must be "
-            f"({joints}, {joints}, ...) and symmetric"
+            f"has a metric of shape {M.shape}; it must be ({joints}, {joints}, ...) "
+            "and symmetric"
         )
     return Metric(contents.axes, M, degree)
 
@@ -460,8 +461,8 @@ def _norm(contents: _Contents, degree: int) -> Finsler:
     rows = checked_numbers("norm", contents.field("norm", "norm_coefficient"))
     if contents.joints != 2 or len(rows) % 2 == 0:
         raise Refusal(
-            f"has a norm of shape {rows.shape} where it must be "
-            "(an odd number, ...) of two joints"
+            f"has a norm of shape {rows.shape}; it must be (an odd number, ...) of "
+            "two joints"
         )
     residual = 0 * rows[0]
     if "norm_residual" in contents:
@@ -476,7 +477,8 @@ def _check_pairs(contents: _Contents, masked: np.ndarray) -> None:
     _, stated = contents.variables.get("pair_joints", ((), pairs))
     if not np.array_equal(stated, pairs):
         raise Refusal(
-            f"has pair_joints other than {pairs.astype(int).tolist()}", instead=SOURCE
+            f"has pair_joints that differ from {pairs.astype(int).tolist()}",
+            instead=SOURCE,
         )
     for name in ("ccf_pairs", "ccf_pairs_error"):
         if name not in contents:
@@ -484,8 +486,8 @@ def _check_pairs(contents: _Contents, masked: np.ndarray) -> None:
         values = contents.field(name, "pair", "component")
         if values.shape[:2] != (len(pairs), 3):
             raise Refusal(
-                f"has {name} of shape {values.shape} where it must be "
-                f"({len(pairs)}, 3, ...)",
+                f"has {name} of shape {values.shape}; it must be ({len(pairs)}, 3, "
+                "...)",
                 instead=SOURCE,
             )
         if not masked.any():

@@ -22,7 +22,7 @@ def load(path: str | Path, sign: str = "", order: str = "") -> Stored:
     states, or that its values tell (`detected_sign`). order: "ndgrid" or "meshgrid", in
     which arrays of a .mat file run; if left out the order of its alpha1 and alpha2."""
     if not isinstance(path, (str, Path)):
-        raise Refusal("a table is a .nc or .mat file", value=path)
+        raise Refusal("a table must be a .nc or .mat file", value=path)
     path = Path(path)
     refuse_program(path)
     if path.suffix.lower() not in FORMATS:

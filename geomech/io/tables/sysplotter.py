@@ -43,7 +43,7 @@ from geomech.mathematics.geometry.minimum_perturbation import minimum_perturbati
 from geomech.mathematics.geometry.representations.field import Field
 from rft.core.refusal import Refusal
 
-CALC = "save it by sys_calcsystem, in a file whose name ends in _calc.mat"
+CALC = "save it with sys_calcsystem, in a file whose name ends in _calc.mat"
 CONTENT = "vecfield.eval.content"
 DRAG = "drag"  # a value of s.system_type
 INERTIA = "inertia"  # another one
@@ -106,8 +106,8 @@ def parse(s: Mapping, sign: str, order: str, sha256: str) -> Stored:
     it has none."""
     if sign not in ("", "+") or order not in ("", "ndgrid"):
         raise Refusal(
-            "has a struct s, which says sign and order itself",
-            instead="drop sign and order",
+            "has a struct s, which defines sign and order itself",
+            instead="leave sign and order out",
         )
     axes = _axes(s, "grid.eval")
     shape = tuple(map(len, axes))
@@ -190,7 +190,7 @@ def _cells(
     count = int(np.prod(lead))
     if not isinstance(cell, np.ndarray) or cell.dtype != object or cell.size != count:
         raise Refusal(
-            f"has s.{path} that is no cell of {' x '.join(map(str, lead))} arrays",
+            f"has s.{path} that is not a cell of {' x '.join(map(str, lead))} arrays",
             instead=CALC,
         )
     out = np.empty((count, *shape))
@@ -200,7 +200,7 @@ def _cells(
         values = _checked_numbers(place, np.nan if values is None else values)
         if values.shape != shape:
             raise Refusal(
-                f"has {place} of shape {values.shape} where its grid makes it {shape}",
+                f"has {place} of shape {values.shape} where its grid requires {shape}",
                 instead=CALC,
             )
         out[k] = values
@@ -220,7 +220,7 @@ def _checked_numbers(place: str, values: Any) -> np.ndarray:
         index = _matlab_index(np.argwhere(~np.isfinite(values))[0])
         raise Refusal(
             f"has {place} that is not finite (nan or inf) at ({index})",
-            instead="mend it",
+            instead="correct the file",
         )
     return checked_numbers(place, values)
 
@@ -241,7 +241,7 @@ def _axes(s: Mapping, path: str) -> tuple[np.ndarray, ...]:
     cell = _get(s, path)
     if not isinstance(cell, np.ndarray) or cell.dtype != object or cell.size < 2:
         raise Refusal(
-            f"has s.{path} that is no cell of the grids of two angles or more",
+            f"has s.{path} that is not a cell of grids of two or more angles",
             instead=CALC,
         )
     grids = [
@@ -249,16 +249,20 @@ def _axes(s: Mapping, path: str) -> tuple[np.ndarray, ...]:
     ]
     if any(x.ndim != len(grids) or x.shape != grids[0].shape for x in grids):
         shapes = ", ".join(str(x.shape) for x in grids)
-        raise Refusal(f"has s.{path} of shapes {shapes}", instead=CALC)
+        raise Refusal(f"has s.{path} of different shapes, {shapes}", instead=CALC)
     axes = []
     for k, x in enumerate(grids):
         place = f"s.{path}{{{k + 1}}}"
         axis = np.moveaxis(x, k, 0).reshape(x.shape[k], -1)
         if np.ptp(axis, axis=1).max() > 1e-9:
             raise Refusal(
-                f"has {place} that does not change along dimension {k + 1} alone",
-                because="as ndgrid's does",
-                instead="permute its arrays, and all others, if they run as meshgrid's",
+                f"has {place} that varies along other dimensions than dimension "
+                f"{k + 1}",
+                because="only that dimension may vary, as with ndgrid",
+                instead=(
+                    "permute its arrays and all others if they are ordered as by "
+                    "meshgrid"
+                ),
             )
         axes.append(checked_axis(place, axis[:, 0]))
     return tuple(axes)
@@ -354,7 +358,7 @@ def _metric(
         raise Refusal(
             f"has s.{path} that is not symmetric: {{{_matlab_index((i, k))}}} at "
             f"({_matlab_index(index)})",
-            instead="mend it",
+            instead="correct the file",
         )
     if _has(s, "system_type") and _get(s, "system_type") == INERTIA:
         return M, None, axes

@@ -40,8 +40,8 @@ class Centreline(Gait):
     """The bends of a body of ``elements`` as measured, at amplitude 1; the amplitude
     scales them.
 
-    file (-): CSV; in a scene from a file relative to that file's folder, else to the
-    current one.
+    file (-): name of a CSV file, relative to the folder of the scene file, or to the
+    current folder if there is none.
 
     Its header line names the columns; rows may have any order:
       t,s,curvature   curvature in rad per body length at s, 0 at the tail to 1 at the
@@ -62,8 +62,8 @@ class Centreline(Gait):
     frames. Along the body they are splines as well, of order 4 in the spacing of s, 3
     in the spacing of points.
 
-    sha256 (-): of the file, filled in if left out; given, the file must have it. centre
-    (rad): takes none.
+    sha256 (-): checksum that the file must have; filled in if left out. centre (rad):
+    not allowed, because a measured centreline has no centre.
 
     The file is read once, when the gait is built.
 
@@ -91,12 +91,13 @@ class Centreline(Gait):
     _curve: ClassVar[Any]  # function of (phases, order), set once the file is read
 
     estimate_is = (
-        "of the computation alone: what the measured midlines are off by is not in it"
+        "of the computation alone, without the errors of the measured midlines"
     )
 
     file: str = field(kw_only=False)
     elements: Annotated[
-        int, Number(3, 2000, "-", "as many as the body has", whole=True)
+        int,
+        Number(3, 2000, "-", "number of elements, the same as in the body", whole=True),
     ] = 100
     period: Annotated[
         float | None,
@@ -104,22 +105,22 @@ class Centreline(Gait):
             frames.SMALLEST_NUMBER,
             LARGEST_NUMBER,
             "unit of t",
-            "of the gait. Left out, the frames run over it once if the last repeats "
-            "the first; else, if they are equally spaced, it is their number times "
-            "their spacing",
+            "period of the gait. If it is left out, the frames cover one period if "
+            "the last repeats the first; otherwise, if they are equally spaced, the "
+            "period is their number times their spacing",
         ),
     ] = None
-    amplitude: Annotated[float, Number(-LARGEST, LARGEST, "-", "scales the bends")] = (
-        1.0
-    )
+    amplitude: Annotated[
+        float,
+        Number(-LARGEST, LARGEST, "-", "factor by which the bends are multiplied"),
+    ] = 1.0
     keep_harmonics: Annotated[
         int,
         Number(
             0,
             2000,
             "-",
-            "smooth by least squares instead, with that many harmonics in time;"
-            " 0 for none",
+            "number of harmonics in time of a least-squares smoothing; 0 for none",
             whole=True,
         ),
     ] = 0
@@ -129,8 +130,8 @@ class Centreline(Gait):
             0,
             2000,
             "-",
-            "and with that many Legendre modes of the curvature along the body;"
-            " 0 for none",
+            "number of Legendre modes of the curvature along the body in that "
+            "smoothing; 0 for none",
             whole=True,
         ),
     ] = 0
@@ -144,7 +145,7 @@ class Centreline(Gait):
         if self.centre:
             raise Refusal(
                 "a measured centreline takes no centre",
-                because="it undulates about the straight body",
+                because="the gait undulates about the straight body",
                 instead="leave centre out",
             )
         if not isinstance(self.sha256, str):
@@ -152,8 +153,8 @@ class Centreline(Gait):
         data = frames.read(self.file)
         if self.sha256.lower() not in ("", data.sha256):
             raise data.wrong(
-                "the file is not the one whose sha256 is given",
-                instead="restore it, or leave sha256 out",
+                "the content of the file does not match sha256",
+                instead="restore the file, or leave sha256 out",
             )
         object.__setattr__(self, "sha256", data.sha256)
         bends = midline.bends(data, self.elements, self.keep_modes)
@@ -201,9 +202,10 @@ class Centreline(Gait):
             cycles = period * self.frequency
             if abs(cycles - 1) > FREQUENCY_TOLERANCE:
                 warnings.warn(
-                    f"{data.name}: the period is {period:.4g} in t, and frequency ="
-                    f" {self.frequency:g} Hz makes it {1 / self.frequency:.4g} s:"
-                    " mend one if t is in s, or call the column frame or phase",
+                    f"{data.name}: the period is {period:.4g} in t, but frequency = "
+                    f"{self.frequency:g} Hz makes it {1 / self.frequency:.4g} s: "
+                    "correct one of them if t is in s; otherwise name the column "
+                    "frame or phase",
                     UnitWarning,
                     stacklevel=5,
                 )
@@ -217,9 +219,9 @@ class Centreline(Gait):
         lag = np.imag(harmonic[:-1].conj() @ harmonic[1:]) / size  # rad, from the tail
         if lag < -BACKWARDS:
             warnings.warn(
-                f"{data.name}: the wave runs from the tail to the head, which swims"
-                " backwards: if the animal swam forwards, give the points from the tail"
-                " to the head, and s from 0 at the tail",
+                f"{data.name}: the wave runs from the tail to the head, which drives "
+                "the body backwards: if the animal swam forwards, give the points "
+                "from the tail to the head, with s = 0 at the tail",
                 Note,
                 stacklevel=5,
             )
@@ -278,8 +280,8 @@ def one_period(
         repeats = abs(t[-1] - period) <= 1e-6 * period
         if t[-1] > period and not repeats:
             raise data.wrong(
-                f"the frames run over {t[-1]:g} in t, more than period = {period:g}",
-                instead="keep one period",
+                f"the frames cover {t[-1]:g} in t, more than period = {period:g}",
+                instead="keep the frames of one period",
             )
     if repeats:
         t = t[:-1]
@@ -295,10 +297,10 @@ def one_period(
     if closing_gap > allowed + 1e-9:
         raise data.wrong(
             "the gait does not close",
-            because=f"bends of the first and the last frame differ by up to"
-            f" {closing_gap:.2g} rad, those of neighbouring frames by up to"
-            f" {moves.max():.2g}",
-            instead="keep just one period, or give the right period",
+            because="the bends of the first and the last frame differ by up to "
+            f"{closing_gap:.2g} rad, those of neighbouring frames by up to "
+            f"{moves.max():.2g}",
+            instead="keep the frames of exactly one period, or correct period",
         )
     return 2 * np.pi * np.append(t / period, 1.0), bends
 
@@ -325,9 +327,9 @@ def _check_once(
         least = first + int((np.diff(difference[first:]) > 0).argmax())
         lag = least / N_PHASES
         raise data.wrong(
-            f"the body does the same again after {lag * period:.3g} in t,"
-            f" {1 / lag:.2g} times in the period of {period:.4g}",
-            instead="give the frames of just one period",
+            f"the motion repeats after {lag * period:.3g} in t, {1 / lag:.2g} times "
+            f"within the period of {period:.4g}",
+            instead="give the frames of exactly one period",
         )
 
     # A frame near the first, followed by others that move away from it again.
@@ -338,9 +340,9 @@ def _check_once(
     is_close = distance[closest] < 0.5 * distance[-1]
     if is_close and distance[-1] > FAR_FROM_FIRST * moves.max():
         raise data.wrong(
-            f"the frame at t = {data.t[closest]:g} repeats the first, and"
-            f" {len(distance) - 1 - closest} more come after it",
-            instead="give the frames of just one period",
+            f"the frame at t = {data.t[closest]:g} repeats the first, and "
+            f"{len(distance) - 1 - closest} more frames follow",
+            instead="give the frames of exactly one period",
         )
 
 
@@ -368,15 +370,15 @@ def _period_of_equal_spacing(data: frames.Frames, t, moves, closing_gap) -> floa
     before the first repeats."""
     if np.ptp(np.diff(t)) > UNEQUAL * t[-1] / (len(t) - 1):
         raise data.wrong(
-            "the last frame does not repeat the first, and they are not equally spaced"
-            " in t",
+            "the last frame does not repeat the first, and the frames are not equally "
+            "spaced in t",
             instead="give period",
         )
     if closing_gap < moves.min() / 3:
         raise data.wrong(
-            f"the last frame all but repeats the first (bends differ by up to"
-            f" {closing_gap:.2g} rad, those of neighbouring frames by {moves.min():.2g}"
-            " or more)",
+            "the last frame almost repeats the first (bends differ by up to "
+            f"{closing_gap:.2g} rad, those of neighbouring frames by "
+            f"{moves.min():.2g} or more)",
             instead="give period",
         )
     return t[-1] * len(t) / (len(t) - 1)
@@ -391,8 +393,8 @@ def _check_order(data: frames.Frames, bends: np.ndarray) -> None:
     bad = np.flatnonzero(3 * reversed_distance < distance)
     if bad.size:
         raise data.wrong(
-            f"the frame at t = {data.t[bad[0]]:g} seems to run from head to tail",
-            instead="turn its rows round",
+            f"the frame at t = {data.t[bad[0]]:g} appears to run from head to tail",
+            instead="reverse the order of its rows",
         )
 
 
@@ -402,12 +404,12 @@ def _check_gaps(data: frames.Frames, gaps: np.ndarray) -> None:
     least = int(gaps.argmin())
     if gaps[widest] > LARGEST_GAP * (1 + 1e-6):
         raise data.wrong(
-            f"after t = {data.t[widest]:g} there is no frame for {gaps[widest]:.3g} of"
-            f" the period, more than {LARGEST_GAP:g}",
-            instead="give more frames, or the right period",
+            f"after t = {data.t[widest]:g} no frame follows for {gaps[widest]:.3g} of "
+            f"the period; the largest allowed gap is {LARGEST_GAP:g}",
+            instead="give more frames, or correct period",
         )
     if gaps[least] < 0.01 / len(gaps):
         raise data.wrong(
-            f"the frame after t = {data.t[least]:g} comes at almost the same time",
-            instead="drop one of the two",
+            f"the frame after t = {data.t[least]:g} follows at almost the same time",
+            instead="remove one of the two",
         )

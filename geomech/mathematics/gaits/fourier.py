@@ -22,7 +22,7 @@ class Series(Gait):
 
     def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the coefficients (cos, sin), each (joints, K)."""
-        raise TypeError(f"{type(self).__name__} gives no coefficients")
+        raise TypeError(f"{type(self).__name__} has no coefficients")
 
     @property
     def joints(self) -> int:
@@ -61,7 +61,9 @@ class Circle(Series):
     (64, 2)
     """
 
-    amplitude: Annotated[float, Number(-LARGEST, LARGEST, "rad", "its radius")] = 1.0
+    amplitude: Annotated[
+        float, Number(-LARGEST, LARGEST, "rad", "radius of the circle")
+    ] = 1.0
 
     kind = "circle"
 
@@ -82,7 +84,7 @@ class Circle(Series):
 class Ellipse(Series):
     """An ellipse, run counter-clockwise about its centre.
 
-    semi_axes (rad): at amplitude 1.
+    semi_axes (rad): semi-axes at amplitude 1.
 
     Examples
     --------
@@ -101,7 +103,8 @@ class Ellipse(Series):
             -LARGEST,
             LARGEST,
             "rad",
-            "by which the first is turned counter-clockwise from alpha_1",
+            "angle by which the first semi-axis is rotated counter-clockwise from "
+            "alpha_1",
         ),
     ] = 0.0
 
@@ -179,8 +182,8 @@ class Fourier(Series):
         sin = finite_array("sin", self.sin, 2)
         if cos.shape != sin.shape:
             raise Refusal(
-                "cos and sin must have one shape (joints, harmonics), got"
-                f" {cos.shape} and {sin.shape}"
+                "cos and sin must have the same shape (joints, harmonics), got "
+                f"{cos.shape} and {sin.shape}"
             )
         for name, x in (("cos", cos), ("sin", sin)):
             object.__setattr__(self, name, tuple(map(tuple, x.tolist())))

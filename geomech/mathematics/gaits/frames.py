@@ -68,7 +68,9 @@ def read(path: str | Path) -> Frames:
     values, notes = source.values(found)
     if {"x", "y"} <= {*columns} and found["x"].unit != found["y"].unit:
         raise Refusal(
-            "x and y are in two units", where=source.place, instead="keep one"
+            "x and y are in different units",
+            where=source.place,
+            instead=("use the same unit for both"),
         )
     source.issue(notes)
     rows = np.stack([*values.values()], -1)
@@ -139,14 +141,14 @@ def _check_grid(frames: Frames) -> None:
         raise frames.wrong(
             f"t = {frames.rows[row, 0]:g}, {key} = {keys[row]:g} is given twice",
             row,
-            instead="keep one",
+            instead="keep one of them",
         )
     places = np.unique(keys)
     if (frames.counts != len(places)).any():
         k = int(frames.counts.argmin())
         missing = np.setdiff1d(places, keys[frames.starts[k] :][: frames.counts[k]])[0]
         raise frames.wrong(
-            f"the frame at t = {frames.t[k]:g} has no {key} = {missing:g}:"
-            f" give every {key} at every t, or at none",
+            f"the frame at t = {frames.t[k]:g} has no {key} = {missing:g}: give every "
+            f"{key} at every t, or leave it out at every t",
             frames.starts[k],
         )

@@ -36,10 +36,10 @@ def bends(frames: Frames, elements: int, modes: int) -> np.ndarray:
     largest = abs(angles[frame, bend])
     if not largest <= LARGEST_BEND:
         raise frames.wrong(
-            f"at t = {frames.t[frame]:g} and s = {(bend + 1) / elements:.3g}"
-            f" neighbouring elements bend by {largest:.3g} rad, more than"
-            f" {LARGEST_BEND:.3g}",
-            instead="mend that frame, or take more elements",
+            f"at t = {frames.t[frame]:g} and s = {(bend + 1) / elements:.3g} "
+            f"neighbouring elements form an angle of {largest:.3g} rad, more than "
+            f"{LARGEST_BEND:.3g}",
+            instead="correct that frame, or use more elements",
         )
     return angles
 
@@ -117,18 +117,18 @@ def _check_points(frames: Frames, start: int, points: np.ndarray) -> None:
     same = np.flatnonzero(np.abs(chord) <= 1e-9 * np.abs(chord).sum())
     if same.size:
         raise frames.wrong(
-            "the point is where its neighbour is",
+            "the point coincides with its neighbour",
             start + same[0] + 1,
-            instead="drop one of the two",
+            instead="remove one of the two",
         )
     turn = np.abs(np.angle(chord[1:] / chord[:-1]))
     if turn.max() > LARGEST_BEND:
         raise frames.wrong(
-            f"the midline turns by {turn.max():.3g} rad at this point, more than"
-            f" {LARGEST_BEND:.3g}",
+            f"the midline bends by {turn.max():.3g} rad at this point, more than "
+            f"{LARGEST_BEND:.3g}",
             int(start + turn.argmax() + 1),
-            instead="order the points from tail to head, mend the frame, or give more"
-            " points",
+            instead="order the points from tail to head, correct the frame, or give "
+            "more points",
         )
 
 
@@ -138,8 +138,8 @@ def _check_lengths(frames: Frames, lengths: np.ndarray) -> None:
     k = int(np.abs(share - 1).argmax())
     if abs(share[k] - 1) > LENGTH_SPREAD:
         raise frames.wrong(
-            f"the midline at t = {frames.t[k]:g} is {share[k]:.3g} times as long as the"
-            f" mean of all frames, off by more than {LENGTH_SPREAD:.0%}",
+            f"the midline at t = {frames.t[k]:g} is {share[k]:.3g} times as long as "
+            f"the mean of all frames, a difference of more than {LENGTH_SPREAD:.0%}",
             frames.starts[k],
-            instead="mend or drop that frame",
+            instead="correct or remove that frame",
         )

@@ -25,7 +25,7 @@ def checked_loop(points) -> tuple[tuple[float, ...], ...]:
     steps = np.linalg.norm(np.diff(loop, axis=0, append=loop[:1]), axis=1)
     if len(loop) < 3 or not (steps > 1e-12 * steps.sum()).all():
         raise Refusal(
-            "points must be at least 3 shapes, neighbours distinct",
+            "points must be at least 3 shapes, and neighbours must differ",
             value=points,
         )
     return tuple(map(tuple, loop.tolist()))
@@ -39,7 +39,7 @@ class Points(Gait):
     Phase runs with chord length. Corners become round, and between few points the curve
     bulges: a `Polygon` has straight sides.
 
-    points (rad): three rows of joint angles or more.
+    points (rad): shapes on the curve, three or more rows of joint angles.
 
     Examples
     --------
@@ -98,10 +98,10 @@ class Points(Gait):
         bulge = self.bulge
         if bulge > LARGEST_BULGE:
             warnings.warn(
-                f"[gait] points: the spline through {len(self.points)} shapes leaves"
-                f" the polygon through them by {100 * bulge:.0f} % of its size: if"
-                " straight sides are meant, take kind = 'polygon', else give more"
-                " points",
+                f"[gait] points: the spline through {len(self.points)} shapes departs "
+                f"from the polygon through them by {100 * bulge:.0f} % of its size: "
+                "for straight sides use kind = 'polygon'; for a smooth curve give "
+                "more points",
                 Note,
                 stacklevel=4,
             )

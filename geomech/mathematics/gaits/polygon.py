@@ -17,7 +17,7 @@ class Polygon(Gait):
     """The straight sides between given shapes, in order and back to the first, such as
     Purcell's stroke, whose joints move one at a time.
 
-    points (rad): the corners, three rows of joint angles or more.
+    points (rad): corners of the polygon, three or more rows of joint angles.
 
     Each side takes a share of the phase by its length and is run from rest to rest, by
     the share 35 u^4 - 84 u^5 + 70 u^6 - 20 u^7 of it at the share u of its time: speed,

@@ -22,14 +22,14 @@ from rft.core.refusal import Refusal
 class Shchf(Gait):
     """The gait of a shchf file of sysplotter, in numbers.
 
-    XV (rad): a1, b1, a3, b3, a5, b5 ... as in its `shchf_LowRe_...` files, for the
-    closed curve u = sum of a_k cos(k t), v = - sum of b_k sin(k t), alpha_1 = (u -
-    v)/sqrt 2, alpha_2 = (u + v)/sqrt 2, in the same direction as there. file (-): a
-    .mat file of points alpha1, alpha2, ... at t, of coefficients A1, B1, A2, B2, ...,
-    or of the paths that sys_calcpath computed; in a scene from a file relative to that
-    file's folder, else to the current one. sha256 (-): of the file, filled in if left
-    out; given, the file must have it. The centre is the mean of the coefficients, if
-    left out.
+    XV (rad): coefficients a1, b1, a3, b3, a5, b5 ... as in the `shchf_LowRe_...` files,
+    for the closed curve u = sum of a_k cos(k t), v = - sum of b_k sin(k t), alpha_1 =
+    (u - v)/sqrt 2, alpha_2 = (u + v)/sqrt 2, in the same direction as there. file (-):
+    name of a .mat file of points alpha1, alpha2, ... at t, of coefficients A1, B1, A2,
+    B2, ..., or of the paths that sys_calcpath computed, relative to the folder of the
+    scene file, or to the current folder if there is none. sha256 (-): checksum that the
+    file must have; filled in if left out. centre (rad): shape angles; if left empty,
+    the mean of the coefficients.
 
     Examples
     --------
@@ -45,7 +45,13 @@ class Shchf(Gait):
     file: str | None = None
     number: Annotated[
         int,
-        Number(1, 10_000, "-", "of the gait, where the file has several", whole=True),
+        Number(
+            1,
+            10_000,
+            "-",
+            "number of the gait, where the file contains several",
+            whole=True,
+        ),
     ] = 1
     amplitude: Scale = 1.0
     sha256: str = ""
@@ -58,9 +64,11 @@ class Shchf(Gait):
         if isinstance(self.XV, str) or not hasattr(self.XV, "__len__"):
             raise Refusal("XV must be numbers", value=self.XV)
         if (self.file is None) == (not len(self.XV)):
-            raise Refusal("a shchf gait has either XV or a file", instead="give one")
+            raise Refusal(
+                "a shchf gait takes either XV or a file", instead=("give one of them")
+            )
         if self.sha256 and self.file is None:
-            raise Refusal("sha256 is that of a file", instead="drop it")
+            raise Refusal("sha256 belongs to a file", instead="leave it out")
         object.__setattr__(self, "file", self.file and str(self.file))
         if self.file:
             curve = self._read_file()
@@ -89,8 +97,8 @@ class Shchf(Gait):
         curve: Any = shchf.read(self.file or "", self.number)
         if self.sha256.lower() not in ("", curve.sha256):
             raise Refusal(
-                f"{self.file} is not the file whose sha256 is given",
-                instead="restore it, or leave sha256 out",
+                f"the content of {self.file} does not match sha256",
+                instead="restore the file, or leave sha256 out",
             )
         object.__setattr__(self, "sha256", curve.sha256)
         if curve.points is not None:

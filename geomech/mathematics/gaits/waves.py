@@ -18,8 +18,8 @@ from rft.core.refusal import Refusal
 @GAITS.register
 @dataclass(frozen=True)
 class Wave(Series):
-    """A travelling wave of joint angles, k = 1, 2 ... from the tail:
-    alpha_k = offset + amplitude cos(t + 2 pi waves k / (joints + 1)).
+    """A travelling wave of joint angles alpha_k, k = 1, 2, ... from the tail: alpha_k =
+    offset + amplitude cos(t + 2 pi waves k / (joints + 1)).
 
     It runs from head to tail, which drives the body head first where drag across
     exceeds drag along; with waves < 0, or reverse, from tail to head; with waves = 0
@@ -35,16 +35,30 @@ class Wave(Series):
 
     kind = "wave"
 
-    amplitude: Annotated[float, Number(-LARGEST, LARGEST, "rad", "of each joint")] = 0.5
+    amplitude: Annotated[
+        float, Number(-LARGEST, LARGEST, "rad", "amplitude of each joint")
+    ] = 0.5
     waves: Annotated[
         float,
-        Number(-5000.5, 5000.5, "-", "on the body, at most half as many as links"),
+        Number(
+            -5000.5,
+            5000.5,
+            "-",
+            "number of waves on the body, at most half the number of links",
+        ),
     ] = 1.0
     offset: Annotated[
-        float, Number(-LARGEST, LARGEST, "rad", "of all joints, which turns the body")
+        float,
+        Number(
+            -LARGEST,
+            LARGEST,
+            "rad",
+            "angle added to all joints, which makes the body turn",
+        ),
     ] = 0.0
     joints: Annotated[
-        int, Number(1, 10_000, "-", "of the body, one fewer than links", whole=True)
+        int,
+        Number(1, 10_000, "-", "number of joints, one fewer than links", whole=True),
     ] = 6
 
     def __post_init__(self):
@@ -132,7 +146,7 @@ class Sine(Gait):
 
     With t the wave travels from head to tail. Its arc length is fixed, whatever the
     amplitude. The bends are angles between neighbouring elements, so the gait is of
-    order 2 in 1/elements. centre (rad): takes none.
+    order 2 in 1/elements. centre (rad): not allowed, because a sine wave has no centre.
 
     Examples
     --------
@@ -149,17 +163,21 @@ class Sine(Gait):
             -10,
             10,
             "-",
-            "A / lambda, the sine's amplitude over its wavelength, 0 to 10",
+            "A / lambda, the amplitude of the sine over its wavelength, 0 to 10",
         ),
     ] = 0.2
     waves: Annotated[
         float,
         Number(
-            0, 500, "-", "wavelengths of arc on the body, > 0 and at most elements / 4"
+            0,
+            500,
+            "-",
+            "number of wavelengths along the body, > 0 and at most elements / 4",
         ),
     ] = 1.0
     elements: Annotated[
-        int, Number(3, 2000, "-", "as many as the body has", whole=True)
+        int,
+        Number(3, 2000, "-", "number of elements, the same as in the body", whole=True),
     ] = 100
 
     def __post_init__(self):
@@ -167,7 +185,7 @@ class Sine(Gait):
         if self.centre:
             raise Refusal(
                 "a sine wave takes no centre",
-                because="it undulates about the straight body",
+                because="the gait undulates about the straight body",
                 instead="leave centre out",
             )
         in_range("waves", self.waves, 0, self.elements / 4)

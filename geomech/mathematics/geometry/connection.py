@@ -161,7 +161,7 @@ def check_fit_options(degree: object, progress: object) -> None:
     in_range("degree", degree, 1, 5, whole=True)
     if progress is not None and not callable(progress):
         raise Refusal(
-            "progress must be a function of the fraction done", value=progress
+            "progress must be a function of the completed fraction", value=progress
         )
 
 

@@ -27,7 +27,7 @@ def _checked(connection, i, j) -> None:
     """Refuse what is no connection, or no two of its joints."""
     if not isinstance(connection, Connection):
         raise Refusal(
-            "a CCF is that of a Connection, such as connection.fit gives",
+            "a CCF is computed from a Connection, such as the result of connection.fit",
             value=connection,
         )
     joints = connection.field.joints

@@ -89,8 +89,8 @@ class Family:
         low, high = self.amplitudes[[0, -1]]
         if not ((a >= low * (1 + 1e-12)) & (a <= high * (1 + 1e-12))).all():
             raise Refusal(
-                f"amplitudes must lie from {low:g} to the family's {high:g},"
-                f" got {a.ravel()[:4]}"
+                f"amplitudes must lie from {low:g} to the largest of the family, "
+                f"{high:g}, got {a.ravel()[:4]}"
             )
         x, y, turn = displacement(self.xi).T
         start = self.heading[:, 0]

@@ -23,9 +23,9 @@ Scale = Annotated[
         -LARGEST,
         LARGEST,
         "-",
-        "scales the curve about its centre; 0 is rest there, which moves nothing, and "
-        "a negative one is the curve reflected through the centre, "
-        "alpha - centre -> centre - alpha at every phase",
+        "scales the curve about its centre; at 0 the body rests at the centre, and a "
+        "negative amplitude reflects the curve through the centre, alpha - centre -> "
+        "centre - alpha at every phase",
     ),
 ]
 
@@ -34,9 +34,9 @@ Scale = Annotated[
 class Gait:
     """A closed curve alpha(t) = centre + amplitude * unit(t).
 
-    Subclasses define `joints`, `unit` and `unit_rate`. centre (rad): shape angles, the
-    origin if left empty. reverse (-): run the curve backwards, t -> -t, from the same
-    start.
+    Subclasses define `joints`, `unit` and `unit_rate`. centre (rad): shape angles of
+    the centre; the origin if left empty. reverse (-): true to run the curve backwards,
+    t -> -t, from the same start.
 
     An amplitude of 0 is rest at the centre, and a negative one is the curve reflected
     through the centre, for all gaits and tiers. harmonics: the highest of the curve.
@@ -53,8 +53,9 @@ class Gait:
             0,
             FASTEST,
             "Hz",
-            "cycles per second, unknown if left out; it makes displacements speeds, "
-            "and changes them only through effects that have a frequency",
+            "cycles per second, unknown if left out; with it displacements become "
+            "speeds, and it changes displacements only through effects that depend on "
+            "the frequency",
         ),
     ] = None
     harmonics = 1
@@ -93,11 +94,11 @@ class Gait:
     def unit(self, t: np.ndarray) -> np.ndarray:
         """Return the curve (T..., joints) of amplitude 1 about 0 at phases t (T...),
         rad."""
-        raise TypeError(f"{type(self).__name__} gives no curve: define unit(t)")
+        raise TypeError(f"{type(self).__name__} defines no curve: define unit(t)")
 
     def unit_rate(self, t: np.ndarray) -> np.ndarray:
         """Return d unit / dt, shaped like `unit`."""
-        raise TypeError(f"{type(self).__name__} gives no curve: define unit_rate(t)")
+        raise TypeError(f"{type(self).__name__} defines no rate: define unit_rate(t)")
 
     def shape(self, t: ArrayLike, amplitudes: ArrayLike | None = None) -> np.ndarray:
         """Return alpha (B..., T..., joints), rad, at phases t (T...), for amplitudes

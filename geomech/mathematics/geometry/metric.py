@@ -193,7 +193,7 @@ def fit_norm(
     axes = as_axes(axes)
     if len(axes) != 2:
         raise Refusal(
-            f"harmonics are those of a plane of two joint rates, got {len(axes)} joints"
+            f"harmonics need a plane of two joint rates, got {len(axes)} joints"
         )
     unit = directions(2, count)
     F = _sampled(norm, axes, unit, progress, map)

@@ -92,8 +92,8 @@ def minimum_perturbation(connection: Connection) -> Frame:
     not solved."""
     if connection.field.masked:
         raise Refusal(
-            "no minimum-perturbation frame of a field with singular shapes",
-            instead="shrink the extent around them",
+            "no minimum-perturbation frame exists for a field with singular shapes",
+            instead="reduce the extent so that it excludes them",
         )
     basis = Basis(connection.axes, connection.degree)
     A_x, A_y, A_theta = connection.A

@@ -76,8 +76,8 @@ def stretch(metric: Metric | Finsler, points: int | None = None) -> Stretch:
     if these are fewer."""
     if len(metric.axes) != 2:
         raise Refusal(
-            "shape space is redrawn on a plane",
-            because=f"two joints, got {len(metric.axes)}",
+            "shape space can be redrawn only as a plane",
+            because=f"it needs two joints, got {len(metric.axes)}",
         )
     if points is None:
         in_range("points", len(metric.axes[0]), 5, 401, whole=True)
@@ -135,8 +135,8 @@ def _lengths(metric, alpha: np.ndarray, ends: np.ndarray) -> np.ndarray:
     length = np.sum(parts, axis=0)
     if not (length > 0).all():
         raise Refusal(
-            "shape space is not redrawn where a change of shape costs nothing",
-            instead="narrow the extent",
+            "shape space cannot be redrawn where a change of shape costs nothing",
+            instead="reduce the extent",
         )
     return length
 

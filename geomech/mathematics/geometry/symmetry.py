@@ -31,10 +31,10 @@ from geomech.mathematics.geometry.traits import Traits
 PHASES = 48
 COMPONENTS = ("x", "y", "heading")
 HEADING = 2  # its index
-ALWAYS = "all shapes are their own image"
+ALWAYS = "every shape is its own image"
 MIRRORED = "the second half of the cycle mirrors the first"
-BACKWARDS = "the cycle run backwards is its own image, head for tail"
-REFLECTED = "the cycle run backwards is its own mirror image"
+BACKWARDS = "the reversed cycle is its own image with head and tail exchanged"
+REFLECTED = "the reversed cycle is its own mirror image"
 RETRACED = "the cycle retraces its path"
 
 

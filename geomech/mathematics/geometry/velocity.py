@@ -71,17 +71,17 @@ def _faults(xi, backwards, twice, good, scale) -> list[str]:
     deviation = np.abs((backwards + xi)[good]).max() / scale
     if deviation > TOLERANCE:
         faults.append(
-            f"is not odd in alphadot (off by {deviation:.2g} of its size):"
-            " a connection tells one direction of each two"
+            f"is not odd in alphadot (by {deviation:.2g} of its size): a connection "
+            "describes only one of each two opposite directions"
         )
     deviation = np.abs((twice - 2 * xi)[good]).max() / scale / 2
     if deviation > TOLERANCE:
         faults.append(
-            f"is not homogeneous in alphadot (off by {deviation:.2g}):"
-            " a connection holds at |alphadot| = 1 only"
+            f"is not homogeneous in alphadot (by {deviation:.2g}): a connection holds "
+            "only at |alphadot| = 1"
         )
     if good.all() and np.ptp(xi, axis=0).max() <= SAME * scale:
-        faults.append("ignores alpha: is it asked for at the shape that is passed?")
+        faults.append("ignores alpha: is it evaluated at the shape that is passed?")
     return faults
 
 
@@ -152,7 +152,7 @@ def evaluate(
     ma = masked_arrays()
     if masked and ma is not None and isinstance(xi, ma.MaskedArray):
         xi = xi.astype(float).filled(np.nan)
-    xi = real_array("what velocity returns", xi)
+    xi = real_array("the value that velocity returns", xi)
     if xi.shape != shape and broadcasts_to(xi, shape):
         xi = np.broadcast_to(xi, shape).copy()
     if xi.shape != shape:

@@ -152,7 +152,7 @@ class WrappedSystem:
         if not isinstance(self.traits, Traits):
             raise Refusal("traits must be Traits(...)", value=self.traits)
         if not _accepts_two(self._velocity):
-            raise Refusal(f"the velocity of {self.kind} must take (alpha, alphadot)")
+            raise Refusal(f"the velocity of {self.kind} must accept (alpha, alphadot)")
 
     @property
     def kind(self) -> str:
@@ -293,8 +293,8 @@ def refuse_singular(system: System, alpha) -> None:
     if singular.any():
         shape = ", ".join(f"{x:.3g}" for x in np.asarray(alpha)[singular][0])
         raise Refusal(
-            f"the gait meets the singular shape near alpha = ({shape}),"
-            f" where {system.traits.singular}",
+            f"the gait passes the singular shape near alpha = ({shape}), where "
+            f"{system.traits.singular}",
             instead="move its centre, or lower the amplitude",
         )
 
@@ -305,6 +305,6 @@ def refuse_mutable(*parts) -> None:
     for part in parts:
         if type(part).__hash__ is None:
             raise Refusal(
-                f"{type(part).__name__} must be a value",
+                f"{type(part).__name__} must be a frozen dataclass",
                 instead="put @dataclass(frozen=True) above the class",
             )

@@ -274,8 +274,8 @@ def velocity_and_power(
     dissipative = capability(system, Dissipative)
     if dissipative is None:
         raise Refusal(
-            f"no power with the {kind_of(system)}",
-            because="nothing says what a change of shape costs it",
+            f"no power is known for the {kind_of(system)}",
+            because="nothing defines what a change of shape costs",
         )
     xi = system.velocity(alpha, alphadot)
     return xi, dissipative.power(alpha, alphadot, xi)

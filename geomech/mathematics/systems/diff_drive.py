@@ -36,11 +36,23 @@ class DifferentialDrive:
     """
 
     wheel_radius: Annotated[
-        float, Number(1e-9, 1e9, "m", "of both; in tracks without a track")
+        float,
+        Number(
+            1e-9,
+            1e9,
+            "m",
+            "radius of both wheels; in units of the track if that is left out",
+        ),
     ] = 0.5
     track: Annotated[
         float | None,
-        Number(1e-9, 1e9, "m", "between the wheels; lengths are in tracks if left out"),
+        Number(
+            1e-9,
+            1e9,
+            "m",
+            "distance between the wheels; lengths are in units of the track if it is "
+            "left out",
+        ),
     ] = None
     frame: str = "mean"
 

@@ -20,9 +20,9 @@ from geomech.mathematics.systems.momentum import Momentum
 class FloatingChain(Momentum):
     """Links joined by hinges, each with its mass and moment of inertia.
 
-    masses (-): of the links, relative; as their lengths if left out. inertias (-): of
-    each link about its centre, over its mass and the square of its length; if left out
-    1/12, of a thin rod.
+    masses (-): relative masses of the links; in proportion to their lengths if left
+    out. inertias (-): moment of inertia of each link about its centre, over its mass
+    and the square of its length; if left out 1/12, the value of a thin rod.
 
     Examples
     --------

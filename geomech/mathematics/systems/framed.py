@@ -61,18 +61,18 @@ class Framed:
             self.inner,
             "minimum-perturbation frame",
             SHAPE_ALONE,
-            f"drop frame = {NAME!r}",
+            f"remove frame = {NAME!r}",
         )
         if self.inner.traits.singularity is not None:
             raise Refusal(
-                f"no minimum-perturbation frame of the {kind_of(self.inner)}, which has"
-                " singular shapes",
-                instead="drop frame",
+                f"no minimum-perturbation frame exists for the {kind_of(self.inner)}, "
+                "which has singular shapes",
+                instead="remove frame",
             )
         if stored_table(self.inner, "connection"):
             raise Refusal(
-                "a table keeps the frame it was made in",
-                instead=f"drop frame = {NAME!r}, or make the table in it",
+                "a table keeps the frame in which it was computed",
+                instead=f"remove frame = {NAME!r}, or compute the table in that frame",
             )
 
     settling = 0.0
@@ -237,8 +237,8 @@ def in_frame(system: System, frame: str) -> System:
         if "frame" in names:
             return dataclasses.replace(system, frame=frame)
     raise Refusal(
-        f"the {kind_of(system)} has one frame, {system.traits.frame!r},"
-        f" and no {frame!r}"
+        f"the {kind_of(system)} has only the frame {system.traits.frame!r}, not "
+        f"{frame!r}"
     )
 
 
@@ -247,13 +247,13 @@ def formula(system: System) -> tuple[Any, tuple[Any, ...]]:
     (`geomech.mathematics.symbolic`); Refusal for a system without a formula."""
     if isinstance(system, Framed):
         raise Refusal(
-            f"no formula in the {NAME} frame, which is a field of numbers",
-            instead="take another frame",
+            f"no formula exists in the {NAME} frame, which is known only numerically",
+            instead="use another frame",
         )
     symbolic = capability(system, Symbolic)
     if symbolic is None:
         raise Refusal(
-            f"no formula of the connection of a {kind_of(system)}",
-            because="'geomech connection' has its numbers",
+            f"no formula is known for the connection of a {kind_of(system)}",
+            because="use 'geomech connection' for its numerical values",
         )
     return symbolic.symbolic()

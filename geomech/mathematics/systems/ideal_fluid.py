@@ -23,9 +23,10 @@ from rft.core.checks import Number
 class IdealFluidSwimmer(Momentum):
     """Elliptical links joined at their tips.
 
-    masses (-): of each link, over the mass of the fluid in its place; if left out 1,
-    neutrally buoyant. inertias (-): of each link about its centre, over its mass and
-    the square of its length; if left out (1 + aspect^2) / 16, of a uniform ellipse.
+    masses (-): mass of each link over the mass of the fluid that it displaces; if left
+    out 1, neutrally buoyant. inertias (-): moment of inertia of each link about its
+    centre, over its mass and the square of its length; if left out (1 + aspect^2) / 16,
+    the value of a uniform ellipse.
 
     Added mass of an ellipse with semi-axes a along and b across, per unit depth: pi rho
     b^2 along, pi rho a^2 across, and pi rho (a^2 - b^2)^2 / 8 about the centre (H.

@@ -23,9 +23,9 @@ LEAST_CORRELATION = 0.85  # of another reading
 LEAST_GAIN = 0.4  # of its correlation over the file's as it is read
 # By (other sign, swapped axes, mirrored axes).
 READINGS = {
-    (1, 0, 0): "of the other sign",
+    (1, 0, 0): "with the opposite sign",
     (0, 1, 0): "with alpha1 and alpha2 swapped",
-    (0, 0, 1): "with both axes mirrored",
+    (0, 0, 1): "with both axes reversed",
     (1, 0, 1): "with angles, or y and heading, positive clockwise",
 }
 AS_READ = (0, 0, 0)
@@ -52,8 +52,8 @@ def misread(table: Connection, bodies: Sequence[Chain]) -> str:
     if score < LEAST_CORRELATION or score < score_as_read + LEAST_GAIN:
         return ""
     return (
-        f"its A is that of a body of links {_words(best)} (correlation {score:.2f}, as"
-        f" it stands {score_as_read:.2f}): check sign, axes and angles"
+        f"its A resembles that of a body of links {_words(best)} (correlation "
+        f"{score:.2f}; as read {score_as_read:.2f}): check sign, axes and angles"
     )
 
 

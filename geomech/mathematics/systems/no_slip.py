@@ -29,8 +29,8 @@ SINGULAR = 1e-14
 class NoSlipSnake:
     """Three links, tail to head, with wheels at their centres.
 
-    lengths (-): relative. frame (-): "mean", centre of mass and mean heading, or
-    "link-1", "link-2", "link-3", centre and heading of that link.
+    lengths (-): relative link lengths, tail to head. frame (-): "mean", centre of mass
+    and mean heading, or "link-1", "link-2", "link-3", centre and heading of that link.
 
     Where the wheels' axles meet in one point, or are parallel, the snake can turn about
     it without a wheel slipping sideways: the shape is singular. For equal links that is
@@ -66,7 +66,7 @@ class NoSlipSnake:
             joint_angles=True,
             frame=self.frame,
             singularity=self._determinant,
-            singular="the wheels' axles meet in one point",
+            singular="the axles of the wheels meet in one point",
         )
 
     @property
@@ -91,8 +91,8 @@ class NoSlipSnake:
 
     def about(self) -> dict:
         where = (
-            f"nan, where {self.traits.singular}, and where they lie between a grid"
-            " point and the next"
+            f"nan, where {self.traits.singular}, and where they lie between two grid "
+            "points"
         )
         return {"singular_shapes": where}
 

@@ -8,7 +8,7 @@ from geomech.mathematics.systems.capabilities import Composite, Part, capability
 from rft.core.premise import Premise, negation
 from rft.core.refusal import Refusal
 
-CURES = {"law": ", or take another law", "effect": ", or drop the effect"}
+CURES = {"law": ", or use another law", "effect": ", or remove the effect"}
 
 
 def broken(system: System, premises: Premise) -> list[Part]:
@@ -26,7 +26,7 @@ def because(system: System, premises: Premise) -> str:
     with"; "" if none does."""
     for part in broken(system, premises):
         if part.role == "law":
-            return f"the law {part.name}, whose drag is of no one power of the speed"
+            return f"the law {part.name}, whose drag is not a power of the speed"
         return f"{_named(part)}, which is {negation(part.breaks)}"
     return ""
 
@@ -45,7 +45,7 @@ def refuse(system: System, what: str, premises: Premise, instead: str) -> None:
     if system.traits.lacks & premises:
         parts = broken(system, premises)
         raise Refusal(
-            f"no {what} with {because(system, premises)}",
+            f"no {what} exists with {because(system, premises)}",
             instead=f"{instead}{CURES.get(parts[0].role, '')}",
         )
 

@@ -18,10 +18,10 @@ from rft.laws.records import is_compilable
 class Solver:
     """How the balance of forces is solved; part of [numerics].
 
-    loads (-): "exact", "midpoint:N", "gauss:N" (rft.formulas.quadrature). backend (-):
-    "numpy", "numba" (compiled code, where numba is installed) or "auto": compiled code
-    where numba is installed (`rft.balance.backend`). Answers are the same but for
-    rounding.
+    loads (-): integration of the forces along a link, "exact", "midpoint:N" or
+    "gauss:N" (rft.formulas.quadrature). backend (-): "numpy", "numba" (compiled code,
+    which needs numba) or "auto", compiled code where numba is installed
+    (`rft.balance.backend`). Results agree to rounding.
 
     Examples
     --------
@@ -39,18 +39,21 @@ class Solver:
             1e-12,
             1,
             "body lengths per rad",
-            "speed below which dry friction is rounded off (rft.balance)",
+            "speed below which dry friction is smoothed (rft.balance)",
         ),
     ] = 1e-6
-    tolerance: Annotated[float, Number(1e-13, 1, "-", "normalised residual")] = 1e-10
+    tolerance: Annotated[
+        float,
+        Number(1e-13, 1, "-", "largest residual of the force balance, normalised"),
+    ] = 1e-10
     cycles: Annotated[
         int | None,
         Number(
             1,
             10_000,
             "-",
-            "cycles of time stepping (rft.time_steps); if left out until they are "
-            "periodic, one where effects break symmetry",
+            "number of cycles in time stepping (rft.time_steps); if left out, until "
+            "they are periodic, or one where effects break symmetry",
             whole=True,
         ),
     ] = None
@@ -60,8 +63,8 @@ class Solver:
             1,
             MOST_PIECES,
             "-",
-            "pieces to a body length, 1 to 10,000, into which effects that vary along "
-            "an element cut it (rft.effects)",
+            "number of pieces per body length, 1 to 10,000, into which elements are "
+            "cut where effects vary along them (rft.effects)",
             whole=True,
         ),
     ] = PIECES
@@ -77,11 +80,11 @@ class Solver:
 
         law_record: of the law of that name."""
         if self.backend == "numpy":
-            return "NumPy, as asked for"
+            return "NumPy, as requested"
         if not is_compilable(law_record):
             return (
-                f"NumPy: compiled code does not know the law {law}, whose traction is"
-                " no formula"
+                f"NumPy: compiled code does not support the law {law}, whose traction "
+                "is not a formula"
             )
         if ahead.has(type(law_record)):
             return "compiled code"
@@ -89,4 +92,4 @@ class Solver:
             return "NumPy: numba is not installed (pip install 'geomech[fast]')"
         if self.backend == "numba":
             return "compiled code"
-        return "compiled code; commands take NumPy where there is little to compute"
+        return "compiled code; commands use NumPy for short computations"

@@ -110,8 +110,8 @@ class Swimmer:
         for effect in self.effects:
             if kinds.count(type(effect)) > 1:
                 raise Refusal(
-                    f"[[effects]] {effect.kind} is asked for twice",
-                    instead="keep one",
+                    f"[[effects]] {effect.kind} is listed twice",
+                    instead="keep one of them",
                 )
         self._check_medium()
 
@@ -161,7 +161,7 @@ class Swimmer:
                 raise Refusal(
                     f"{first_name} gives {quantity} = {first_value!r}"
                     f" and {name} {value!r}",
-                    because="it is one swimmer",
+                    because="both belong to one swimmer",
                 )
 
     @property
@@ -287,7 +287,7 @@ class Swimmer:
             self,
             "body velocity from shape alone",
             SHAPE_ALONE,
-            "run a whole gait by the direct tier",
+            "run a whole gait with the direct tier",
         )
         settings = self._settings("tolerance", "backend")
         return rft.BodyVelocity(self.medium, self.body, **settings)
@@ -498,7 +498,9 @@ class _Uncertainty:
         except ValueError as error:
             raise Refusal(
                 "[medium] covariance",
-                because=f"a standard deviation away there is no medium ({error})",
+                because=(
+                    f"one standard deviation away the medium is not valid ({error})"
+                ),
                 instead="measure more drag, or leave the covariance out",
             ) from None
 
@@ -574,8 +576,8 @@ class _Facts:
         is_viscous = type(swimmer.medium) is rft.Viscous
         if not (swimmer.traits.linear and is_plain and is_viscous):
             raise Refusal(
-                "a formula is that of a chain of links in a viscous medium without"
-                " effects"
+                "a formula is available only for a chain of links in a viscous medium "
+                "without effects"
             )
         A, alpha = connections.viscous_chain(
             body.lengths, swimmer.medium.ratio, body.frame
@@ -630,8 +632,8 @@ def note_radius(swimmer: Swimmer) -> None:
             link = min(links) if radius > min(links) else max(links)
             whole = f"a link of {size * link:.3g} {unit}"
         warnings.warn(
-            f"end-caps have a radius of {size * radius:.3g} {unit}, on {whole}: is it"
-            " in another unit?",
+            f"end-caps have a radius of {size * radius:.3g} {unit} on {whole}: is the "
+            "radius in another unit?",
             UnitWarning,
             stacklevel=4,
         )

@@ -39,8 +39,8 @@ from rft.core.checks import Number, check_numbers
 from rft.core.refusal import Refusal
 
 LENGTHS = (
-    "its lengths are taken for body lengths; say body_length = 1 if they are, 3 if one"
-    " is a link of three equal ones"
+    "its lengths are assumed to be in body lengths; add body_length = 1 if they are, "
+    "or 3 if the unit is one of three equal links"
 )
 # The likely bodies of a file that does not say its body.
 THREE_LINKS = [Chain(frame=frame) for frame in ("mean", "link-1", "link-2", "link-3")]
@@ -71,12 +71,13 @@ def _chain(stored: tables.Stored) -> Chain | None:
 class Table:
     """A file of `geomech connection`, .nc or .mat, or a file of sysplotter.
 
-    file (-): in a scene from a file relative to that file's folder, else to the current
-    one. sign (-): "+" or "-" for xi = + or - A alphadot in the file; order (-):
-    "ndgrid" or "meshgrid"; if left out as the file says or shows (`tables.load`).
-    sha256 (-): of the file, filled in if left out; given, the file must have it.
-    frame (-): of xi, "mean", "link-1" ... or "minimum-perturbation", the file's own if
-    left out; another frame takes a body, from the file or the scene.
+    file (-): name of the file, relative to the folder of the scene file, or to the
+    current folder if there is none. sign (-): "+" or "-" for xi = + or - A alphadot in
+    the file. order (-): "ndgrid" or "meshgrid"; if left out, the order that the file
+    states or shows (`tables.load`). sha256 (-): checksum that the file must have;
+    filled in if left out. frame (-): frame of xi, "mean", "link-1" ... or
+    "minimum-perturbation"; if left out, the frame of the file. Another frame needs a
+    body, from the file or the scene.
 
     body: the chain of the table, in the frame of its A, where the file does not say it.
     medium: its law on that body gives the power of a change of shape, in place of a
@@ -98,8 +99,9 @@ class Table:
             1e-9,
             1e9,
             "the file's unit",
-            "of the body, where the file does not say it; results are then in body "
-            "lengths, as which, with a note, its lengths are taken if left out",
+            "length of the body, where the file does not give it; results are then in "
+            "body lengths. If it is left out, lengths in the file are taken for body "
+            "lengths, with a note",
         ),
     ] = None
     sha256: str = ""
@@ -136,25 +138,25 @@ class Table:
         that the file has itself."""
         if self.sha256.lower() not in ("", stored.sha256):
             raise Refusal(
-                f"{self.file} is not the file whose sha256 is given",
-                instead="restore it, or leave sha256 out",
+                f"the content of {self.file} does not match sha256",
+                instead="restore the file, or leave sha256 out",
             )
         if stored.connection.field.masked and not isinstance(stored.connection, Tube):
             cure = ""
             if stored.A_error is not None:
-                cure = ": give the .nc file of the measured gait, which has them"
+                cure = ": give the .nc file of the measured gait, which contains them"
             raise Refusal(
-                f"{self.file} has singular shapes (nan), and nothing is looked up"
-                f" between those{cure}"
+                f"{self.file} has singular shapes (nan), and its values cannot be "
+                f"interpolated between them{cure}"
             )
         is_stated = stored.sized and stored.computed is not None
         if not _is_in_body_lengths(stored):
             is_stated = True
         if self.body_length is not None and is_stated:
             raise Refusal(
-                f"{self.file} says the body's length itself, {stored.length:g}"
-                f" {stored.unit}",
-                instead="drop body_length",
+                f"{self.file} states the length of the body itself, {stored.length:g} "
+                f"{stored.unit}",
+                instead="leave body_length out",
             )
 
     def _with_body(self, stored: tables.Stored) -> tables.Stored:
@@ -165,25 +167,27 @@ class Table:
         if not isinstance(self.body, Chain):
             raise Refusal("the body of a table must be a Chain", value=self.body)
         if stored.body is not None:
-            raise Refusal(f"{self.file} says its body itself", instead="drop the body")
+            raise Refusal(
+                f"{self.file} describes its body itself", instead=("leave the body out")
+            )
         joints = len(stored.connection.axes)
         if joints != self.body.joints:
             raise Refusal(
-                f"the numbers of shape variables differ, {self.body.joints} of the"
-                f" body and {joints} of {self.file}",
-                instead="mend one",
+                f"the numbers of shape variables differ: {self.body.joints} of the "
+                f"body, {joints} of {self.file}",
+                instead="correct one of them",
             )
         if self.body.length is not None:
             raise Refusal(
-                "the body of a table has no length",
+                "the body of a table must not have a length",
                 value=self.body.length,
-                instead="say body_length",
+                instead="give body_length instead",
             )
         if stored.frame not in (UNKNOWN_FRAME, self.body.frame):
             raise Refusal(
-                f"the body has the frame {self.body.frame!r},"
-                f" {self.file} {stored.frame!r}",
-                instead="mend one",
+                f"the body has the frame {self.body.frame!r}, but {self.file} has "
+                f"{stored.frame!r}",
+                instead="correct one of them",
             )
         known = {name: getattr(self.body, name) for name in BODY}
         return replace(stored, frame=self.body.frame, body=known)
@@ -194,8 +198,8 @@ class Table:
             return None
         if self.chain is None or self.chain.frame != self.original.frame:
             raise Refusal(
-                f"a medium needs the body of {self.file}, which does not say it",
-                instead="add [system.body], with the frame that A has",
+                f"a medium needs a body, which {self.file} does not describe",
+                instead="add [system.body], in the frame of A",
             )
         return Swimmer(self.medium, self.chain)
 
@@ -374,7 +378,7 @@ class _Tables:
     def near_gait(self) -> str:
         if self.system.tube is None:
             return ""
-        return f"the mean gait that {self.system.file} was measured at"
+        return f"the mean gait near which {self.system.file} was measured"
 
     def table(self, name: str) -> Any:
         stored = self.system.stored

@@ -77,7 +77,7 @@ ADAPTED = Tier(
             "curves",
             (4, 6, 8, 12, 16, 24, 48),
             "4 if smooth, about 2 across kinks",
-            "every amplitude of one family from one table",
+            "all amplitudes of one family from one table",
         ),
     ),
 )

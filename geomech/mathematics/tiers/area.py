@@ -35,7 +35,8 @@ def area(field: Field, gait: Gait, amplitudes=None, phases: int = 256) -> np.nda
     in_range("phases", phases, 1, 1e9, whole=True)
     if not isinstance(field, Field):
         raise Refusal(
-            "the area tier sums up a Field, such as curvature.ccf gives", value=field
+            "the area tier integrates a Field, such as the result of curvature.ccf",
+            value=field,
         )
     if field.joints != 2 or gait.joints != 2:
         raise Refusal(
@@ -127,7 +128,7 @@ AREA = Tier(
     _plan,
     joints=range(2, 10_001),
     offered=range(2, 6),
-    takes="takes two joints and more, of which a loop encloses area",
+    takes="needs two or more joints, because only then does a loop enclose area",
     instead="use path or direct",
     regular=True,
     settings=(
@@ -135,7 +136,7 @@ AREA = Tier(
             "grid",
             fitted.GRIDS,
             "3 or 4 in amplitude, set by the gait",
-            "a map to read, not digits",
+            "a map that can be read, rather than digits",
         ),
     ),
 )

@@ -45,32 +45,47 @@ class Numerics:
             2,
             4096,
             "-",
-            "of alphadot in the least-squares fit; if left out 8 for up to two joints, "
-            "beyond 16 a joint, or 4 where xi is linear in alphadot",
+            "number of directions of alphadot in the least-squares fit; if left out, "
+            "8 for up to two joints, 16 per joint for more, or 4 where xi is linear "
+            "in alphadot",
             whole=True,
         ),
     ] = None
-    grid: Annotated[int, Number(4, 4096, "-", "points per joint", whole=True)] = 31
+    grid: Annotated[
+        int, Number(4, 4096, "-", "points of the grid per joint", whole=True)
+    ] = 31
     extent: Annotated[
-        float, Number(1e-6, 100, "rad", "of the field, on either side of 0")
+        float, Number(1e-6, 100, "rad", "half width of the grid, on either side of 0")
     ] = 2.5
     interpolation: Annotated[
-        int, Number(1, 5, "-", "degree of the field's splines", whole=True)
+        int,
+        Number(
+            1, 5, "-", "degree of the splines that interpolate the field", whole=True
+        ),
     ] = 3
-    phases: Annotated[int, Number(8, 1_000_000, "-", "per cycle", whole=True)] = 256
+    phases: Annotated[
+        int, Number(8, 1_000_000, "-", "number of phases per cycle", whole=True)
+    ] = 256
     harmonics: Annotated[
         int | None,
         Number(
             1,
             999,
             "-",
-            "the highest kept, odd; if left out 15 of two joint rates, 9 of three, 5 "
-            "beyond",
+            "highest harmonic kept, odd; if left out, 15 for two joint rates, 9 for "
+            "three, 5 for more",
             whole=True,
         ),
     ] = None
     curves: Annotated[
-        int, Number(4, 4096, "-", "in the table of a family of gaits", whole=True)
+        int,
+        Number(
+            4,
+            4096,
+            "-",
+            "number of curves in the table of a family of gaits",
+            whole=True,
+        ),
     ] = 24
 
     def __post_init__(self):
@@ -168,7 +183,7 @@ class Tier:
     result: str = "connection or CCF"
     joints: range = range(1, 10_001)
     offered: range = range(1, 10_001)
-    takes: str = "takes a body of joints"
+    takes: str = "needs a body with joints"
     instead: str = "use direct"
     regular: bool = False
     common: bool = True
@@ -190,16 +205,16 @@ class Tier:
         refuse(system, self.result, self.rests_on, "use the direct tier")
         if system.joints not in self.joints:
             raise Refusal(
-                f"the {self.name} tier {self.takes}, this body has {system.joints}",
+                f"the {self.name} tier {self.takes}; this body has {system.joints}",
                 instead=self.instead,
             )
         if self.meets_singular_shapes(system):
             gait = near_gait(system)
             reason = f"the {kind_of(system)} has singular shapes"
             if gait:
-                reason = f"A is known near {gait} alone"
+                reason = f"A is known only near {gait}"
             raise Refusal(
-                f"the {self.name} tier sums a field up, and {reason}",
+                f"the {self.name} tier integrates a field, and {reason}",
                 instead="use path or direct",
             )
 

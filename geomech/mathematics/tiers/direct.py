@@ -17,7 +17,7 @@ from rft.core.checks import in_range
 from rft.core.premise import NONE
 
 COUNTS = (2, 4, 8, 16, 32, 64)  # of elements or nodes of a link
-NOTHING = "nothing that exact link integrals do not give for less"
+NOTHING = "nothing that exact link integrals do not give at lower cost"
 
 
 def direct(
@@ -88,8 +88,8 @@ DIRECT = Tier(
         Setting(
             "phases",
             (16, 32, 64, 128, 256, 512),
-            "spectral if smooth, else 2",
-            "the true answer",
+            "spectral if smooth, otherwise 2",
+            "convergence to the true answer",
         ),
         Setting(
             "segments",
@@ -113,14 +113,14 @@ DIRECT = Tier(
             "regularisation",
             (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6),
             "1",
-            "links that really stand still",
+            "links that truly stand still",
             "limit",
         ),
         Setting(
             "pieces",
             (5, 10, 20, 40, 80),
-            "2 in the mean, scattered by pivots",
-            "effects that vary along long links",
+            "2 on average, scattered by pivots",
+            "resolution of effects that vary along long links",
             "limit",
         ),
     ),

@@ -61,8 +61,8 @@ def _axes(system, numerics) -> tuple[np.ndarray, ...]:
         raise Refusal(
             f"harmonics of {d} joint rates need a field, and one of {n}^{d} shapes"
             " is too large",
-            instead=f"lower [numerics] grid, to {fitted.finest_grid(d)} or less, or use"
-            " path, adapted or direct, which need none",
+            instead=f"lower [numerics] grid, to {fitted.finest_grid(d)} or less, or "
+            "use path, adapted or direct, which need no field",
         )
     return fitted.axes(system, numerics)
 
@@ -104,7 +104,7 @@ HARMONIC = Tier(
     _plan,
     joints=range(2, 6),
     offered=range(2, 3),  # of more joints by name: the table is large
-    takes="takes two to five joints, and of more there are too many harmonics",
+    takes="needs two to five joints; more joints have too many harmonics",
     instead="use path, adapted or direct",
     regular=True,
     settings=(

@@ -68,7 +68,7 @@ PATH = Tier(
             "directions",
             (2, 4, 8, 16, 32, 64),
             "2, harmonics folding back",
-            "a steadier fit",
+            "a more stable fit",
             "limit",
         ),
         Setting(

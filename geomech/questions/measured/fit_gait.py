@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from geomech.studies.measured.log import Log
     from geomech.studies.measured.midlines.trial import Trial
 
-HELP = "table of joint angles, x, y, heading, or points of midlines"
+HELP = "table of joint angles, x, y, heading, or of midline points"
 SCENE = ".toml"
 
 
@@ -35,9 +35,9 @@ def write_scene(path: Path, result: Result, *, field: Path | None = None) -> Non
         field = written or path.with_suffix(".nc")
     if field != written and not field.exists():
         raise Refusal(
-            f"there is no {field}",
-            because="a scene of a mean gait takes its connection from a file",
-            instead=f"write it before, as by save({str(field)!r})",
+            f"there is no file {field}",
+            because="a scene of a mean gait reads its connection from a file",
+            instead=f"write that file first, for example with save({str(field)!r})",
         )
     write_text(path, scene_text(result, field, path))
 
@@ -45,9 +45,9 @@ def write_scene(path: Path, result: Result, *, field: Path | None = None) -> Non
 @dataclass(frozen=True)
 class FitGait(Question):
     """Fit a measured gait. A log of joint angles gives the connection near its mean
-    gait, with intervals; tracked midlines give speed, heading, slip, wave efficiency,
-    amplitude and wavelength, each with an interval, and in a medium the same as
-    predicted. -o FIELD.nc -o SCENE.toml writes the connection and a scene of the mean
+    gait. Tracked midlines give speed, heading, slip, wave efficiency, amplitude and
+    wavelength, and --medium adds their prediction. All values have confidence
+    intervals. -o FIELD.nc -o SCENE.toml writes the connection and a scene of the mean
     gait."""
 
     file: Annotated[
@@ -57,55 +57,55 @@ class FitGait(Question):
     columns: Annotated[
         Sequence[str],
         Option(
-            "columns T,A1,A2,...,X,Y,HEADING, or points along the body",
+            "columns T,A1,A2,...,X,Y,HEADING, or midline points",
             "LIST",
             parsing.names,
         ),
     ] = ()
-    degrees: Annotated[bool, Option("read joint angles and heading in degrees")] = False
+    degrees: Annotated[bool, Option("joint angles and heading are in degrees")] = False
     level: Annotated[
         float,
-        Option("share of cases in which intervals cover the truth, 0.95", "SHARE"),
+        Option("confidence level of intervals (default 0.95)", "SHARE"),
     ] = 0.95
     harmonics: Annotated[
         int | None,
-        Option("harmonics of A in the phase, cross-validated if left out", "N"),
+        Option("harmonics of A in phase (default cross-validated)", "N"),
     ] = None
     limits: Annotated[
         float | None,
         Option(
-            "distance from the mean gait that the field covers", "ANGLE", parsing.angle
+            "largest distance of the field from the mean gait", "ANGLE", parsing.angle
         ),
     ] = None
     body_length: Annotated[
         float | None, Option("length of the body, in the unit of x and y", "M")
     ] = None
     medium: Annotated[
-        Any, Option("medium, or its file, in which midlines are predicted", "NAME")
+        Any, Option("medium or its file, to predict the midlines", "NAME")
     ] = None
     units: Annotated[
         str | None,
         Option("unit of x and y of midlines: m, cm, mm, px or BL", "UNIT"),
     ] = None
-    scale: Annotated[float | None, Option("mm per pixel of midlines", "MM")] = None
-    fps: Annotated[float | None, Option("frames per second of midlines", "N")] = None
-    y: Annotated[str | None, Option("y of midlines runs up or down", "SENSE")] = None
+    scale: Annotated[float | None, Option("mm per pixel of the film", "MM")] = None
+    fps: Annotated[float | None, Option("frames per second of the film", "N")] = None
+    y: Annotated[
+        str | None, Option("direction of y in the file: up or down", "SENSE")
+    ] = None
     head: Annotated[
         str | None,
-        Option("the first or last point is the head, else by the motion", "END"),
+        Option("head is the first or last point (default by motion)", "END"),
     ] = None
     least_score: Annotated[
         float | None,
-        Option(
-            "score from which on points are taken; of a likelihood 0.6 if left out", "P"
-        ),
+        Option("lowest score of points used (default 0.6 for likelihoods)", "P"),
     ] = None
     individual: Annotated[
-        str | None, Option("animal to take, of several in the file", "NAME")
+        str | None, Option("animal to use, if the file has several", "NAME")
     ] = None
     mend: Annotated[
         bool,
-        Option("leave out points that jump or swap, turn reversed frames round"),
+        Option("leave out points that jump or swap, reverse turned frames"),
     ] = False
     # Effects on the body in the medium, which have no text on the command line.
     effects: Sequence[Any] = field(default=(), kw_only=True)
@@ -140,7 +140,7 @@ class FitGait(Question):
         fields = [path for path in paths if path.suffix.lower() == ".nc"]
         if scenes and len(fields) != 1:
             raise Refusal(
-                f"{scenes[0]} takes the connection from one file",
+                f"{scenes[0]} reads the connection from one file",
                 instead="say -o FIELD.nc, too",
             )
         connection_file = None

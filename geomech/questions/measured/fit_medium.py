@@ -11,7 +11,7 @@ from geomech.io.files import write_text
 from geomech.questions.shared import loading, names, parsing, tools
 from geomech.questions.shared.base import Option, Question, Run, Subject
 
-HELP = "CSV file, or short-rod-drag or flank-drag, samples that ship"
+HELP = "CSV file, or a sample: short-rod-drag, flank-drag"
 SIZES = ("radius", "length", "depth", "density", "area")
 # Laws of the vertical plane.
 MAP = "stress-map"
@@ -40,11 +40,11 @@ def write_medium(path: Path, result: Result) -> None:
 
 @dataclass(frozen=True)
 class FitMedium(Question):
-    """Fit a medium to your own drag data. Rods, with the columns psi_deg, F_parallel_N,
-    F_perpendicular_N, give a force law; plates in the vertical plane, with beta, gamma,
-    alpha_x, alpha_z (degrees, N/cm^3), nine coefficients; a plate that is pushed
-    straight down, with depth_m, force_N, the factor zeta. -o FILE.toml writes the
-    medium."""
+    """Fit a medium to your own drag data. The columns of the file decide what is
+    fitted: psi_deg, F_parallel_N, F_perpendicular_N of a dragged rod give a force law;
+    beta, gamma, alpha_x, alpha_z (degrees, N/cm^3) of plates in the vertical plane give
+    nine coefficients; depth_m, force_N of a plate pushed straight down give the factor
+    zeta. -o FILE.toml writes the medium."""
 
     drag: Annotated[
         str, Subject(loading.as_typed, names.drag_names, (), "DRAG.csv", HELP)
@@ -52,36 +52,36 @@ class FitMedium(Question):
     law: Annotated[
         str | None,
         Option(
-            "granular, viscous, coulomb, stress-map or zeta, else by columns", "LAW"
+            "granular, viscous, coulomb, stress-map, zeta (default by columns)", "LAW"
         ),
     ] = None
     end_caps: Annotated[
         float | str,
         Option(
-            "ends of the rod: left-out (the default), fitted or 1 for a flat end",
+            "ends: left-out (default), fitted, or 1 for a flat end",
             "E",
             parsing.end_caps,
         ),
     ] = 0.0
     radius: Annotated[
         float | None,
-        Option("radius of the rod in m, in place of the file's", "SIZE"),
+        Option("radius of the rod in m, instead of the file's", "SIZE"),
     ] = None
     length: Annotated[
         float | None,
-        Option("length of the rod in m, in place of the file's", "SIZE"),
+        Option("length of the rod in m, instead of the file's", "SIZE"),
     ] = None
     depth: Annotated[
         float | None,
-        Option("depth of the rod's axis in m, in place of the file's", "SIZE"),
+        Option("depth of the rod's axis in m, instead of the file's", "SIZE"),
     ] = None
     density: Annotated[
         float | None,
-        Option("density of the bed in kg/m^3, in place of the file's", "SIZE"),
+        Option("density of the bed in kg/m^3, instead of the file's", "SIZE"),
     ] = None
     area: Annotated[
         float | None,
-        Option("area of the plate in m^2, in place of the file's", "SIZE"),
+        Option("area of the plate in m^2, instead of the file's", "SIZE"),
     ] = None
 
     name: ClassVar[str] = "fit_medium"
@@ -151,7 +151,7 @@ class FitMedium(Question):
     @staticmethod
     def remarks(result: Result) -> list[str]:
         law = result.attributes["law"]
-        lines = ["errors are half widths of intervals with 95 %"]
+        lines = ["errors are half widths of 95 % confidence intervals"]
         if law == MAP:
             lines += [
                 f"the map {result.attributes['map']}",
@@ -164,7 +164,7 @@ class FitMedium(Question):
             scene = "an intruder scene"
         return [
             *lines,
-            f'{scene} takes it by -o FILE.toml and [medium] file = "FILE.toml"',
+            f'to use it in {scene}: -o FILE.toml, then [medium] file = "FILE.toml"',
         ]
 
     @staticmethod
@@ -216,12 +216,12 @@ def rod_words(result: Result) -> list[str]:
         if f"rod_{name}" in result:
             size = result[f"rod_{name}"]
             sizes.append(f"{name} {float(size):g} {size.unit}")
-    of_rod = ", ".join(sizes) or "sizes not known"
+    of_rod = ", ".join(sizes) or "sizes unknown"
     lines = [f"end caps: {caps}; rod and bed: {of_rod}"]
     lacks = result.attributes.get("lacks", "")
     if lacks:
         first = lacks.partition(",")[0]
         lines.append(
-            f"k is not known without {lacks}: in the header lines, or as --{first}"
+            f"k is unknown without {lacks}: add it to the header lines, or as --{first}"
         )
     return lines

@@ -12,11 +12,14 @@ def headline(result: Result) -> list[str]:
     facts = result.attributes
     frequency = float(result["frequency"])
     residual = float(result["phase_residual"])
-    cycles = f"{facts['cycles']} whole cycles of {facts['columns']}"
+    cycles = f"{facts['cycles']} full cycles of {facts['columns']}"
     return [
         f"{facts['file']}: {cycles}, {frequency:.6g} per unit of t",
-        f"phase within {residual:.2g} rad of a uniform run through each",
-        f"displacement per cycle, with intervals of {facts['level']:.3g} of cases:",
+        f"phase within {residual:.2g} rad of uniform progress through each cycle",
+        (
+            f"displacement per cycle, with {100 * facts['level']:.3g} % confidence "
+            "intervals:"
+        ),
     ]
 
 
@@ -43,9 +46,12 @@ def remarks(result: Result) -> list[str]:
     for name, share in zip(POSE, result["explained"].values):
         parts.append(f"{name} {100 * share:.3g} %")
     return [
-        "difference: rms of logged and predicted cycles; scatter: of the logged ones",
-        f"explained of the body velocity: {', '.join(parts)}",
-        f"connection: {harmonics} in the phase; the data reach {reach.min():.3g} to "
+        (
+            "difference: rms between logged and predicted cycles; scatter: rms of the "
+            "logged cycles"
+        ),
+        f"explained share of the body velocity: {', '.join(parts)}",
+        f"connection: {harmonics} in phase; the data extend {reach.min():.3g} to "
         f"{reach.max():.3g} rad from the mean gait",
         f"status: {result.attributes['status']}",
     ]

@@ -18,14 +18,14 @@ def headline(result: Result) -> list[str]:
     cycles = f"{facts['cycles']} full cycles of {facts['points']} points"
     first = f"{facts['file']}: {cycles}"
     if facts["cycles_left_out"]:
-        first = f"{first}; {facts['cycles_left_out']} with gaps left out"
+        first = f"{first}; {facts['cycles_left_out']} cycles with gaps left out"
     return [
         first,
         f"head: {facts['head']}",
         f"smoothed by {facts['modes']} modes along the body and "
-        f"{facts['knots_per_cycle']:.3g} knots a cycle, more than by cross-validation; "
-        f"noise of a point {noise:.2g} BL",
-        f"with intervals of {100 * facts['level']:.3g} % of cases:",
+        f"{facts['knots_per_cycle']:.3g} knots per cycle, more than cross-validation "
+        f"chose; noise of a point {noise:.2g} BL",
+        f"with {100 * facts['level']:.3g} % confidence intervals:",
     ]
 
 
@@ -66,10 +66,10 @@ def closing_words(result: Result, name: str) -> str:
     words = f"{name} = {scalar(tools.in_degrees(present))}"
     if math.isfinite(float(closing)):
         value = scalar(tools.in_degrees(closing))
-        return f"{words}: {value} gives the measured distance"
+        return f"{words}: {value} reproduces the measured distance"
     tried = tools.in_degrees(one["parameter_tried"])
     low, high = (float(f"{x:.3g}") for x in tried.values)
     span = f"{low:g} to {high:g}"
     if tried.unit != "1":
         span = f"{span} {tried.unit}"
-    return f"{words}: none from {span} gives the measured distance"
+    return f"{words}: no value from {span} reproduces the measured distance"

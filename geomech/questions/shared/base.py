@@ -119,7 +119,7 @@ class Question(Plain):
     command asks consent for."""
 
     name: ClassVar[str]
-    cheaper_alternative: ClassVar[str] = "ask for less"
+    cheaper_alternative: ClassVar[str] = "request less"
     report_above: ClassVar[float] = 5.0
     parallel: ClassVar[bool] = False
     folder: ClassVar[bool] = False

@@ -8,30 +8,30 @@ from geomech.questions.shared import parsing
 from geomech.questions.shared.base import Option
 
 PANELS = "panels to draw, such as x or x,theta"
-LIMIT = "limit of the colours, a number or percentiles as 98% or 5%:95%"
+LIMIT = "colour limit: a number, or percentiles 98% or 5%:95%"
 
 ColourLimit = Annotated[Any, Option(LIMIT, "LIMIT", parsing.colour_limit)]
 Panels = Annotated[Sequence[str], Option(PANELS, "NAMES", parsing.panels)]
 CurvePanels = Annotated[Sequence[str], Option(PANELS, "NAMES", parsing.curve_panels)]
 Pair = Annotated[
-    Any, Option("joints on the axes, as 1,3; all pairs if left out", "I,J")
+    Any, Option("joints on the axes, such as 1,3 (default all pairs)", "I,J")
 ]
 Slice = Annotated[
     Any,
     Option(
-        "angles of the joints that are held, as 0.3 or 0.3,-20deg",
+        "angles of the fixed joints, such as 0.3 or 0.3,-20deg",
         "ANGLES",
         parsing.angles,
     ),
 ]
 OtherFrame = Annotated[
     str | None,
-    Option("draw another body frame below, on the same scales", "FRAME"),
+    Option("also draw another body frame, on the same scales", "FRAME"),
 ]
 Store = Annotated[
     Path | None,
     Option(
-        "folder of settled beds and runs, the user's cache if left out",
+        "folder of settled beds and runs (default the user's cache)",
         "DIR",
         parsing.folder,
     ),

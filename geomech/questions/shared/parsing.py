@@ -93,6 +93,8 @@ def folder(text: str, subject: Any, flag: str) -> Path:
     """Return the folder of a name; an empty name is refused."""
     if not text:
         raise Refusal(
-            "an empty name", where=flag, instead="name a folder, '.' for this one"
+            "the name is empty",
+            where=flag,
+            instead="give a folder name, '.' for this one",
         )
     return Path(text)

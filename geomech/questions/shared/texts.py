@@ -12,8 +12,8 @@ from geomech.core.errors import choose
 from rft.core.refusal import Refusal, located
 
 # Reasons to refuse degrees.
-NO_ANGLE = "this is no angle"
-DEGREES_KEY = "this key takes degrees as they are"
+NO_ANGLE = "this option is not an angle"
+DEGREES_KEY = "this key is already in degrees"
 # Panels of figures, by the words of --component.
 MAPS = ("x", "y", "theta")
 CURVES = ("x", "y", "theta", "distance")
@@ -53,7 +53,7 @@ def parse_numbers(
         raise Refusal(
             f"{text!r} is in degrees, but {no_angle}",
             where=option,
-            instead="give a number without 'deg'",
+            instead="write a number without 'deg'",
         ) from None
     except ValueError:
         expected = "a list of numbers such as 0.5,0.3"
@@ -96,9 +96,9 @@ def limit_pair(text: str) -> tuple[float, float]:
         ends += parse_numbers("--limits", end, 1, None)
     if len(ends) > 2:
         raise Refusal(
-            f"{text!r} is no limit",
+            f"{text!r} is not a limit",
             where="--limits",
-            instead="give one such as 2.5, 120deg or -0.5:2",
+            instead="write  2.5, 120deg or -0.5:2",
         )
     if len(ends) == 1:
         return -ends[0], ends[0]
@@ -111,7 +111,7 @@ def no_degrees_of_amplitude(scene: Any) -> str | None:
     is an angle."""
     if is_angle(scene.gait, "amplitude"):
         return None
-    return f"the amplitude of a {type(scene.gait).__name__.lower()} is none"
+    return f"the amplitude of a {type(scene.gait).__name__.lower()} is not an angle"
 
 
 def no_degrees_of(scene: Any, parameter: str) -> str | None:
@@ -172,8 +172,8 @@ def spread(option: str, text: str, no_degrees: str | None = NO_ANGLE) -> list[fl
         values = [start + (stop - start) * k / intervals for k in range(count)]
     else:
         raise Refusal(
-            f"{text!r} is neither a list such as 0.5,1.0 nor START:STOP:COUNT such as "
-            "0.2:2:10",
+            f"{text!r} is neither a list such as 0.5,1.0 nor a range START:STOP:COUNT "
+            "such as 0.2:2:10",
             where=option,
         )
     if not all(map(math.isfinite, values)):
@@ -193,13 +193,13 @@ def parameters(
         if not equals or parameter in texts:
             raise Refusal(
                 f"--over {text!r}",
-                instead="give each parameter once, as PARAM=START:STOP:COUNT",
+                instead="write each parameter once, as PARAM=START:STOP:COUNT",
             )
         texts[parameter] = values
     if drawn and len(texts) > 2:
         raise Refusal(
             f"cannot draw {len(texts)} parameters",
-            instead="sweep one or two, or leave --plot out",
+            instead="sweep one or two parameters, or remove --plot",
         )
     axes = {}
     for parameter, values in texts.items():
@@ -225,7 +225,7 @@ def parse_end_caps(text: str) -> float | str:
         return float(text)
     except ValueError:
         raise Refusal(
-            f"--end-caps {text!r} is neither left-out, fitted nor a number"
+            f"--end-caps {text!r} is not left-out, fitted or a number"
         ) from None
 
 
@@ -255,19 +255,19 @@ def colour_limit(
     in_percent = limit.endswith("%")
     if not is_limit(limit, in_percent):
         raise Refusal(
-            f"{text!r} is no limit",
+            f"{text!r} is not a limit",
             where="--clim",
-            instead="give a number above 0, or a percentile such as 98% or 5%:95%",
+            instead="write a number above 0, or percentiles such as 98% or 5%:95%",
         )
     if in_percent:
         return limit
     panels = panels or MAPS
     if "theta" in panels and len(panels) > 1:
         raise Refusal(
-            f"{text!r} is one limit",
+            f"{text!r} is a single limit",
             where="--clim",
-            because="panels of theta have another unit than those of x and y",
-            instead="say --component x, or a percentile such as 98%",
+            because="panels of theta have a different unit from those of x and y",
+            instead="use --component x, or a percentile such as 98%",
         )
     return float(limit)
 
@@ -301,7 +301,7 @@ def measurements(path: Path | None, scene: Any, panels: Sequence[str]) -> Any:
         return None
     if len(panels) > 1:
         raise Refusal(
-            "--data FILE is of one quantity",
-            instead="name its panel alone with --component, such as x",
+            "--data FILE contains one quantity",
+            instead="choose its panel with --component, such as x",
         )
     return read(path, scene, angle=panels == ("theta",))

@@ -31,9 +31,9 @@ ERRORS = ("error", "force_error", "moment_error")
 
 @dataclass(frozen=True)
 class Accuracy(Question):
-    """Measure error against time for every tier and setting. The cheapest settings that
-    meet an error are listed. The settings of an intruder scene are numbers of elements
-    or triangles; of a robot, steps, elements and rounding."""
+    """Measure error against time for every tier and setting. The result lists the
+    cheapest settings for each tolerance. The settings of an intruder scene are numbers
+    of elements or triangles; those of a robot are steps, elements and rounding."""
 
     scene: Annotated[
         "Scene | Intruding | WalkerScene",
@@ -41,7 +41,7 @@ class Accuracy(Question):
     ]
     runs: Annotated[
         int | None,
-        Option("runs of each setting, of which the quickest is timed", "N"),
+        Option("runs of each setting, of which the fastest is timed", "N"),
     ] = None
 
     name: ClassVar[str] = "accuracy"
@@ -73,7 +73,7 @@ class Accuracy(Question):
         words = f"{facts['scene']}: error of {facts['about']}"
         if "speed" in result:
             words = f"{words}, {result['speed'].values:.6g} m/s,"
-        return [f"{words} against seconds of computing"]
+        return [f"{words} against computing time in seconds"]
 
     @staticmethod
     def summary(result: Result) -> Result:
@@ -85,8 +85,8 @@ class Accuracy(Question):
         if "own_error" in result:
             system_error = size(float(result["own_error"]))
             lines.append(
-                f"errors in the table include the system's own, {system_error} BL, "
-                "which no setting takes away; those below do not"
+                "errors in the table include the error of the system itself, "
+                f"{system_error} BL, which no setting reduces; those below do not"
             )
         for k in range(result.sizes["setting"]):
             for name in ERRORS:
@@ -112,14 +112,14 @@ def setting_words(result: Result, k: int, name: str) -> str:
     about = name.replace("_", " ")
     unit = error_words(result, name)
     if str(result["against"][k]) == "limit":
-        unit = f"{unit} against its own limit"
+        unit = f"{unit} relative to its own limit"
     words = (
         f"{result['setting'][k]} {number(values[0])} to {number(values[1])}: "
         f"{about} {size(errors[0])} to {size(errors[1])}{unit} "
         f"in {number(seconds[0])} to {number(seconds[1])} s"
     )
     if "buys" in result:
-        words = f"{words}; buys {result['buys'][k]}"
+        words = f"{words}; gives {result['buys'][k]}"
     return f"{words} ({order_words(result, k, name)})"
 
 
@@ -134,7 +134,7 @@ def error_words(result: Result, name: str) -> str:
     """Return the unit of an error, as it stands behind a number."""
     unit = result[name].units
     if unit == "1":
-        return " of its largest"
+        return " of its largest value"
     return f" {unit}"
 
 
@@ -143,5 +143,5 @@ def order_words(result: Result, k: int, name: str) -> str:
     order = float(result[name.removesuffix("error") + "order"][k])
     measured = f"measured order {order:.1f}"
     if math.isnan(order):
-        measured = "no order, all rounding"
+        measured = "no order, only rounding"
     return f"{measured}; theory: {result['order_by_theory'][k]}"

@@ -23,17 +23,16 @@ SIGN = "positive for counter-clockwise loops"
 
 @dataclass(frozen=True)
 class Ccf(Question):
-    """Compute the CCF and its integral over the scene's gait. --plot draws both. Of
-    three and more joints: a slice for each pair, or for one, with the others fixed."""
+    """Compute the CCF and its integral over the scene's gait. --plot draws both. A body
+    with three or more joints has a slice for each pair of joints, with the other joints
+    fixed."""
 
     scene: Annotated[
         "Scene", Subject(loading.load_scene, names.scene_names, ("grid", "extent"))
     ]
     pair: Pair = None
     slice: Slice = None
-    metric: Annotated[
-        bool, Option("draw rings of joint rates that take the same effort")
-    ] = False
+    metric: Annotated[bool, Option("draw rings of joint rates of equal effort")] = False
     compare_frame: OtherFrame = None
     # Whether shape space is redrawn to equal effort, for a picture.
     stretched: bool = field(default=False, kw_only=True)
@@ -97,8 +96,8 @@ class Ccf(Question):
     def check(self) -> None:
         if self.sliced and (self.metric or self.stretched):
             raise Refusal(
-                "``metric`` and ``stretch`` are those of two joints",
-                instead="drop them for slices",
+                "``metric`` and ``stretch`` need two joints",
+                instead="remove them for slices",
             )
         self.plan.check()
 
@@ -118,12 +117,12 @@ class Ccf(Question):
         choose("``style``", style, plots.CCF_STYLES)
         if stretch and (self.metric or self.compare_frame or style != "map"):
             raise Refusal(
-                "``stretch`` is a map of its own",
-                instead="drop ``style``, ``metric`` and ``compare_frame``",
+                "``stretch`` draws a map of its own",
+                instead="remove ``style``, ``metric`` and ``compare_frame``",
             )
         if self.metric and style != "map":
             raise Refusal(
-                "``metric`` draws on a map", instead=f"drop ``style`` {style}"
+                "``metric`` needs a map to draw on", instead=f"remove ``style`` {style}"
             )
 
     def compute(self, run: Run) -> Result:
@@ -195,10 +194,10 @@ class Ccf(Question):
         *,
         style: Annotated[
             str,
-            Option("draw a map (colours, the default), contours or a surface", "STYLE"),
+            Option("map (coloured, the default), contours or surface", "STYLE"),
         ] = "map",
         stretch: Annotated[
-            bool, Option("redraw shape space so that equal lengths take equal effort")
+            bool, Option("stretch shape space so that equal lengths take equal effort")
         ] = False,
         component: Panels = (),
         clim: ColourLimit = None,
@@ -216,10 +215,10 @@ class Ccf(Question):
         if stretch and "stretched_shape" not in result:
             raise Refusal(
                 "the stretched shape space was not computed",
-                instead="say ``stretched``, of a scene of two joints",
+                instead="request ``stretched`` for a scene with two joints",
             )
         if stretch and ax is not None:
-            raise Refusal("a stretched map is drawn as a figure", instead="drop ``ax``")
+            raise Refusal("a stretched map fills a figure", instead="remove ``ax``")
         scene = scene_of(result)
         labels = shape_labels(scene.system)
         options = {"labels": labels, "components": component, "clim": clim}
@@ -231,7 +230,7 @@ class Ccf(Question):
                 (options["other"],) = slices_of(result, "other_ccf")
             planes = slices_of(result, "ccf")
             if ax is not None:
-                raise Refusal("slices are drawn as a figure", instead="drop ``ax``")
+                raise Refusal("slices fill a figure", instead="remove ``ax``")
             return plots.planes_figure(
                 planes, scene.gait, style=style, names=both, **options
             )
@@ -266,13 +265,14 @@ def zero_line_words(result: Result) -> str:
     if share == 0:
         ccf = result["ccf"].values[0]
         if not ccf.min() < 0 < ccf.max():
-            return "zero line of x: none, x has one sign"
+            return "zero line of x: none, because x has one sign"
         reach = float(result["zero_line_reach"])
-        return f"zero line of x: further than {reach:.3g} rad from the gait's middle"
+        return f"zero line of x: more than {reach:.3g} rad from the middle of the gait"
     nearest = float(result["zero_line_nearest"])
     farthest = float(result["zero_line_farthest"])
     words = (
-        f"zero line of x: {nearest:.2g} to {farthest:.2g} rad from the gait's middle"
+        f"zero line of x: {nearest:.2g} to {farthest:.2g} rad from the middle of "
+        "the gait"
     )
     if share == 1:
         return words
@@ -287,7 +287,7 @@ def integral_words(result: Result) -> list[str]:
         if not zero_reason(result[name]):
             moved.append(f"{name} {scalar(result[name])}")
     about = (
-        f"integral over the scene's gait, of amplitude {amplitude:g} (the area tier):"
+        f"integral over the scene's gait at amplitude {amplitude:g} (the area tier):"
     )
     nothing = zeros(result.only(*POSE))
     if not moved:

@@ -32,16 +32,16 @@ def write_table(
     result: Result,
     *,
     sign: Annotated[
-        str | None, Option("sign of A in a .mat file: + (the default) or -", "+|-")
+        str | None, Option("sign of A in a .mat file: + (default) or -", "+|-")
     ] = None,
     order: Annotated[
         str | None,
-        Option("order of a .mat file: ndgrid (the default) or meshgrid", "ORDER"),
+        Option("array order of a .mat file: ndgrid (default) or meshgrid", "ORDER"),
     ] = None,
     layout: Annotated[
         str | None,
         Option(
-            "layout of a .mat file: arrays (the default) or struct, sysplotter's s",
+            "layout of a .mat file: arrays (default), or sysplotter's struct",
             "LAYOUT",
         ),
     ] = None,
@@ -57,7 +57,7 @@ def write_table(
     file.write(path, with_contents(result, ending, layout), **settings)
     has_sign = "sign" in getattr(file, "settings", ())
     if has_sign and not sign and layout != LAYOUTS[1]:
-        note(f"{path} has {SIGNS['+']}; ``sign`` - gives the other")
+        note(f"{path} has {SIGNS['+']}; ``sign`` - writes the other sign")
 
 
 def with_contents(result: Result, ending: str, layout: str | None = None) -> Result:
@@ -77,8 +77,9 @@ def with_contents(result: Result, ending: str, layout: str | None = None) -> Res
 
 @dataclass(frozen=True)
 class Connection(Question):
-    """Compute the local connection on a grid. A NetCDF file has the fit residual and
-    the CCF, too; a .mat file has A and the metric, in a layout of sysplotter's."""
+    """Compute the local connection on a grid. A NetCDF file also has the residual of
+    the fit and the CCF; a .mat file has A and the metric, in a layout that sysplotter
+    reads."""
 
     scene: Annotated[
         "Scene", Subject(loading.load_scene, names.scene_names, ("grid", "extent"))
@@ -157,7 +158,7 @@ class Connection(Question):
         if self.sliced and self.compare_frame is not None:
             raise Refusal(
                 "``compare_frame`` draws maps of two joints",
-                instead="drop it, or compare CCFs of the pair ('geomech ccf')",
+                instead="remove it, or compare the CCFs of the pair ('geomech ccf')",
             )
         self.plan.check()
 
@@ -243,7 +244,7 @@ class Connection(Question):
         result: Result,
         *,
         style: Annotated[
-            str, Option("draw arrows (quiver, the default) or streamlines", "STYLE")
+            str, Option("arrows (quiver, the default) or streamlines", "STYLE")
         ] = "quiver",
         component: Panels = (),
         clim: ColourLimit = None,
@@ -269,8 +270,8 @@ class Connection(Question):
             return plots.plane_connection_figure(slices_of(result, "A"), **options)
         if len(labels) != 2:
             raise Refusal(
-                f"a body of {len(labels)} joints has no one map",
-                instead="say ``pair``, or ``drawn`` for all pairs",
+                f"a body of {len(labels)} joints has no single map",
+                instead="use ``pair``, or ``drawn`` for all pairs",
             )
         connection = connection_of(result)
         if ax is not None:
@@ -302,22 +303,22 @@ def check_settings(scene: Any, ending: str, options: dict[str, Any]) -> None:
                 if name in getattr(one, "settings", ())
             ]
             raise Refusal(
-                f"``{name}`` is that of a {' or '.join(others)} file",
-                instead=f"drop it, a {ending} file says what it has",
+                f"``{name}`` applies to a {' or '.join(others)} file",
+                instead=f"remove it: a {ending} file stores its layout",
             )
     struct = options.get("layout") == LAYOUTS[1]
     if struct and ("sign" in options or "order" in options):
         raise Refusal(
             "a struct s has its own sign and order",
-            instead="drop ``sign`` and ``order``",
+            instead="remove ``sign`` and ``order``",
         )
 
 
 def cost_variables(balances: int, seconds: float) -> list[Any]:
     """Return what the computation took."""
     return [
-        Variable("balances", (), balances, "1", "force balances that were solved"),
-        Variable("seconds", (), seconds, "s", "of computing"),
+        Variable("balances", (), balances, "1", "number of force balances solved"),
+        Variable("seconds", (), seconds, "s", "computing time"),
     ]
 
 
@@ -349,19 +350,19 @@ def direction_words(shares: Any) -> list[str]:
     if not rows:
         return []
     changes = ", ".join(rows)
-    return [f"directions of alphadot: more of them change A by about {changes} (rms)"]
+    return [f"more directions of alphadot change A by about {changes} (rms)"]
 
 
 def fit_words(result: Result) -> str:
     """Return what the linear fit leaves of the velocity."""
     if result.attributes.get("exact_fit"):
-        return "exact, xi is linear in alphadot"
+        return "exact, because xi is linear in alphadot"
     if "fit_share" not in result or np.isnan(result["fit_share"].values).all():
-        return "fit residual unknown"
+        return "residual of the fit unknown"
     parts = []
     for name, share in zip(COMPONENTS, result["fit_share"].values):
         parts.append(f"{name} {percent(share)}")
-    words = f"leaves {', '.join(parts)} of the rms of xi"
+    words = f"leaves {', '.join(parts)} of the rms of xi unexplained"
     singular = int(result["singular_shapes"].values)
     if singular:
         words = f"{words}; {singular} singular shapes"

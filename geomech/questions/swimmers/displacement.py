@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 
 EFFORT = ("path_length", "work", "cost_of_transport")
 LARGEST_COMPARED = 4  # amplitudes up to which the other tiers' x is shown
-FRAME = "x ahead, y to the left, as the body frame points at the start of the cycle"
+FRAME = "x ahead, y to the left, along the body frame at the start of the cycle"
 
 
 @dataclass(frozen=True)
 class Displacement(Question):
-    """Compute the displacement of a gait by each tier. x, y and heading after a cycle
-    from phase t = 0, each with an estimated error."""
+    """Compute the displacement of a gait by each tier. The result has x, y and heading
+    after one cycle from phase t = 0, each with an estimated error."""
 
     scene: Annotated[
         "Scene",
@@ -39,22 +39,22 @@ class Displacement(Question):
     amplitudes: Annotated[
         float | Sequence[float] | None,
         Option(
-            "amplitudes, as 0.5,1,30deg or START:STOP:COUNT, the gait's if left out",
+            "amplitudes: 0.5,1,30deg or START:STOP:COUNT",
             "LIST",
             parsing.amplitudes,
         ),
     ] = None
     tiers: Annotated[
         str | Sequence[str] | None,
-        Option("tiers, of area,adapted,path,harmonic,direct", "LIST", parsing.tiers),
+        Option("tiers among area,adapted,path,harmonic,direct", "LIST", parsing.tiers),
     ] = None
     tolerance: Annotated[
         float | None,
         Option("use the cheapest tier with an error of at most E BL", "E", flag="tol"),
     ] = None
-    effort: Annotated[bool, Option("add path length, work and cost of transport")] = (
-        False
-    )
+    effort: Annotated[
+        bool, Option("also compute path length, work, cost of transport")
+    ] = False
     # A gait has no text on the command line, where the scene has one.
     gait: "Gait | None" = field(default=None, kw_only=True)
 
@@ -78,7 +78,7 @@ class Displacement(Question):
 
     def check(self) -> None:
         if self.tolerance is not None and self.tiers is not None:
-            raise Refusal("``tolerance`` chooses the tier", instead="drop ``tiers``")
+            raise Refusal("``tolerance`` chooses the tier", instead="remove ``tiers``")
         if self.effort:
             from geomech.studies.estimates.effort import refuse_costless
 
@@ -168,7 +168,7 @@ class Displacement(Question):
             frequency = facts["frequency"]
             lines.append(f"speed: net distance times frequency, {frequency:g} Hz")
         if "medium_error_rule" in result:
-            lines.append("medium: one standard deviation by its covariance")
+            lines.append("medium: one standard deviation, from its covariance")
             lines += shift_words(result)
         if "error_is" in facts:
             lines.append(f"estimated error: {facts['error_is']}")
@@ -181,7 +181,7 @@ class Displacement(Question):
         component: CurvePanels = (),
         data: Annotated[
             Any,
-            Option("draw points, of columns amplitude,value,error", "FILE.csv"),
+            Option("points to draw, in columns amplitude,value,error", "FILE.csv"),
         ] = None,
         ax: Any = None,
         quantity: str = "net_distance",
@@ -237,7 +237,7 @@ def tier_words(result: Result) -> str:
     if "tolerance" in facts:
         return f"{name} tier, cheapest within {facts['tolerance']:g} BL"
     if len(tiers) > 1:
-        return f"{name} tier, most exact of {len(tiers)}"
+        return f"{name} tier, the most accurate of {len(tiers)}"
     return f"{name} tier"
 
 
@@ -254,7 +254,7 @@ def errors_of_others(result: Result) -> str:
     for k, tier in enumerate(result["tier"].values.tolist()):
         if k != shown:
             words.append(f"{tier} {size(float(x.error[k].max(initial=0.0)))}")
-    return f"other tiers, largest error ({x.unit}): {', '.join(words)}"
+    return f"largest errors of the other tiers ({x.unit}): {', '.join(words)}"
 
 
 def shift_words(result: Result) -> Iterable[str]:

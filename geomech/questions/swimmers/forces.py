@@ -17,15 +17,15 @@ if TYPE_CHECKING:
     from geomech.scenes.model import Scene
     from geomech.studies.mechanics.newtons import Sizes
 
-PANELS = f"panels to draw, of {','.join(parsing.FORCE_PANELS)}"
+PANELS = f"panels among {','.join(parsing.FORCE_PANELS)}"
 EQUAL = 1e-6  # relative difference up to which powers are called the same
 
 
 @dataclass(frozen=True)
 class Forces(Question):
-    """Compute force, power and bending moment along the body. Forces are in newtons
-    where length, radius and depth of the body are known, and else in axial drags of the
-    straight body."""
+    """Compute force, power and bending moment along the body. Forces are in newtons if
+    length, radius and depth of the body are known, otherwise in units of the axial drag
+    of the straight body."""
 
     scene: Annotated[
         "Scene", Subject(loading.load_scene, names.scene_names, ("medium",))
@@ -71,13 +71,13 @@ class Forces(Question):
     def headline(result: Result) -> list[str]:
         name = result.attributes["scene"]
         if not result.attributes["travels"]:
-            where = "forwards is where the frame points to at phase 0"
+            where = "forwards is the direction of the frame at phase 0"
             return [f"{name}: no net displacement; {where}"]
         distance = result["net_distance"]
         degrees = math.degrees(float(result["direction"]))
         return [
-            f"{name}: {float(distance):.4g} {distance.unit} per cycle, "
-            f"{degrees:.1f} degrees from the frame's heading at phase 0"
+            f"{name}: {float(distance):.4g} {distance.unit} per cycle, {degrees:.1f} "
+            "degrees from the heading of the frame at phase 0"
         ]
 
     @staticmethod
@@ -117,7 +117,7 @@ def power_words(result: Result) -> str:
     at_joints = f"at the joints {joints:.4g} {power.unit}"
     if abs(joints - float(power)) <= EQUAL * max(abs(largest), 1e-300):
         at_joints = "at the joints the same"
-    return f"power {scalar(power)} into the medium, largest {largest:.4g}; {at_joints}"
+    return f"power {scalar(power)} into the medium, at most {largest:.4g}; {at_joints}"
 
 
 def moment_words(result: Result) -> str:
@@ -135,9 +135,9 @@ def activation_words(result: Result) -> str:
     places = result["place"].values
     lag_list = ", ".join(f"{lag:.3g}" for lag in lags)
     place_list = ", ".join(f"{place:.3g}" for place in places)
-    words = f"activation ahead of bending by {lag_list} rad at s = {place_list}"
+    words = f"activation leads bending by {lag_list} rad at s = {place_list}"
     ratio = float(result["fundamental_speed_ratio"])
     if len(lags) > 1 and math.isfinite(ratio):
-        wave = f"its wave runs {ratio:.3g} times as fast as that of curvature"
+        wave = f"its wave is {ratio:.3g} times as fast as the wave of curvature"
         words = f"{words}; {wave}"
     return words

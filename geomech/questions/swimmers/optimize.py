@@ -29,8 +29,8 @@ def write_scene(path: Path, result: Result) -> None:
     """Write the scene with the best gait, behind a comment with its value."""
     if "best_scene_toml" not in result.attributes:
         raise Refusal(
-            "the scene has parts that no file can name",
-            instead="write the result to another format, such as .nc",
+            "the scene has parts that a file cannot name",
+            instead="write the result in another format, such as .nc",
         )
     first, second, *_ = Optimize.headline(result)
     about = textwrap.wrap(f"{first} ({second})", COMMENT_WIDTH)
@@ -40,30 +40,30 @@ def write_scene(path: Path, result: Result) -> None:
 
 @dataclass(frozen=True)
 class Optimize(Question):
-    """Find the best gait for an objective. Its value has an error; -o FILE.toml writes
-    it as a scene, --plot draws its loop on the CCF."""
+    """Find the best gait for an objective. Its value has an estimated error; -o
+    FILE.toml writes the gait as a scene, and --plot draws its loop on the CCF."""
 
     scene: Annotated["Scene", Subject(loading.load_scene, names.scene_names)]
     objective: Annotated[
-        str, Option("maximise displacement, efficiency, turning or speed", "NAME")
+        str, Option("displacement (default), efficiency, turning or speed", "NAME")
     ] = "displacement"
     direction: Annotated[
-        str | None, Option("take the displacement along x or y of the body", "x|y")
+        str | None, Option("direction of the displacement, x or y of the body", "x|y")
     ] = None
     harmonics: Annotated[
-        int | None, Option("harmonics of the Fourier series, 5 if left out", "N")
+        int | None, Option("harmonics of the Fourier series (default 5)", "N")
     ] = None
     limits: Annotated[
         Any,
         Option(
-            "joint limits, as 2.5, 120deg, -0.5:2 or 1,2 for each",
+            "joint limits: 2.5, 120deg, -0.5:2, or 1,2 for each joint",
             "ANGLES",
             parsing.joint_limits,
         ),
     ] = None
     starts: Annotated[
         int | None,
-        Option("number of starts, 9 in dry media and else 1 if left out", "N"),
+        Option("number of starts (default 9 in dry media, otherwise 1)", "N"),
     ] = None
     rate: Annotated[
         float | None, Option("largest joint rate in rad/s, for speed", "RATE")
@@ -148,7 +148,7 @@ class Optimize(Question):
             f"the scene's gait: {scalar(result['start_value'])}",
         ]
         if float(value) <= float(result["start_value"]) * (1 + BETTER):
-            lines.append("nothing better than the scene's own gait was found")
+            lines.append("no better gait than the scene's own was found")
         return lines
 
     @staticmethod
@@ -164,7 +164,7 @@ class Optimize(Question):
         lines = []
         if "largest_rate" in facts:
             rate = facts["largest_rate"]
-            lines.append(f"rates of shape up to {rate:.6g} rad/s")
+            lines.append(f"joint rates up to {rate:.6g} rad/s")
         if "largest_power" in facts:
             power = facts["largest_power"]
             lines.append(f"mean power up to {power:g} drag x BL/s")
@@ -175,7 +175,7 @@ class Optimize(Question):
         seconds = float(result["seconds"])
         return [
             *lines,
-            f"limits touched: {touched}",
+            f"limits reached: {touched}",
             f"{cycles} cycles evaluated in {seconds:.2g} s",
         ]
 
@@ -184,7 +184,7 @@ class Optimize(Question):
         result: Result,
         *,
         stretch: Annotated[
-            bool, Option("draw it also where equal lengths take equal effort")
+            bool, Option("also draw it stretched to equal effort")
         ] = False,
         clim: ColourLimit = None,
     ) -> Any:

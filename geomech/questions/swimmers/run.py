@@ -32,14 +32,14 @@ DEFAULT = "three-link-glass"
 HELP = "built-in name or TOML file"
 
 Data = Annotated[
-    Any, Option("draw points, of columns amplitude,value,error", "FILE.csv")
+    Any, Option("points to draw, in columns amplitude,value,error", "FILE.csv")
 ]
 
 
 @dataclass(frozen=True)
 class Run(Question):
-    """Compute connection, CCF and displacements into a folder. Displacements are drawn
-    against amplitude."""
+    """Compute connection, CCF and displacements into a folder. --plot draws the
+    displacements against the amplitude."""
 
     scene: Annotated[
         "Scene",
@@ -207,7 +207,7 @@ def refuse_folder(scene: Any, folder: Path) -> None:
     if not has_text(path, toml(scene)):
         raise Refusal(
             f"cannot write {path}",
-            because="another scene stands there",
+            because="it holds the results of another scene",
             instead="choose another folder with -o",
         )
 

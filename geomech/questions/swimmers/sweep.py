@@ -23,8 +23,8 @@ LARGEST_DRAWN = 2  # parameters of a figure
 
 @dataclass(frozen=True)
 class Sweep(Question):
-    """Compute displacement or speed over a grid of parameters. Speeds are those of
-    walking robots. A repeated command resumes an interrupted one."""
+    """Compute displacement or speed over a grid of parameters. Scenes of walking robots
+    give speeds. Repeating an interrupted command resumes it."""
 
     scene: Annotated["Scene", Subject(loading.load_moving, names.scene_names)]
     over: Annotated[
@@ -56,7 +56,7 @@ class Sweep(Question):
         if len(self.over) > LARGEST_DRAWN:
             raise Refusal(
                 f"cannot draw {len(self.over)} parameters",
-                instead="sweep one or two, or leave ``plot`` out",
+                instead="sweep one or two parameters, or leave ``plot`` out",
             )
 
     def cost(self) -> Cost:

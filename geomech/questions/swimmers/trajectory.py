@@ -28,14 +28,14 @@ def write_film(path: Path, result: Result) -> None:
 
 @dataclass(frozen=True)
 class Trajectory(Question):
-    """Follow the body through its gait. A table has pose, joint angles and ends of all
-    links at every phase. A film (-o FILE.gif) or a strip of pictures for a page
-    (--plot) shows the body on its track beside its shape on the CCF."""
+    """Follow the body through its gait. A table has the pose, the joint angles and the
+    ends of all links at every phase. A film (-o FILE.gif) or a strip of pictures
+    (--plot) shows the body on its track next to its shape on the CCF."""
 
     scene: Annotated["Scene", Subject(loading.load_scene, names.scene_names)]
     cycles: Annotated[
         int | None,
-        Option("cycles of the gait, 3 in a film and else 1 if left out", "N"),
+        Option("cycles of the gait (default 1, in a film 3)", "N"),
     ] = None
     # Whether the CCF is computed, on which pictures show the shape; whether a film is
     # drawn, whose cost counts.
@@ -104,7 +104,7 @@ class Trajectory(Question):
             cycles = f"{count} cycles"
         return [
             f"{facts['scene']}: motion of the frame {facts['frame']} over {cycles}",
-            "x ahead, y to the left, as the frame points at phase 0",
+            "x ahead, y to the left, along the frame at phase 0",
         ]
 
     @staticmethod

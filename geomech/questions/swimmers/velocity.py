@@ -14,19 +14,23 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Velocity(Question):
-    """Compute the body velocity of one shape and its rate. The answer has a residual
-    and a status."""
+    """Compute the body velocity of one shape and its rate. The result includes the
+    residual and the status of the force balance."""
 
     scene: Annotated["Scene", Subject(loading.load_with_gait, names.scene_names)]
     alpha: Annotated[
         tuple[float, ...],
         Option(
-            "joint angles in rad, as 0.5,0.3 or 30deg,20deg", "ANGLES", parsing.angles
+            "joint angles in rad, such as 0.5,0.3 or 30deg,20deg",
+            "ANGLES",
+            parsing.angles,
         ),
     ]
     alphadot: Annotated[
         tuple[float, ...],
-        Option("joint rates in rad per unit of time, as 1,0", "RATES", parsing.angles),
+        Option(
+            "joint rates in rad per unit of time, such as 1,0", "RATES", parsing.angles
+        ),
     ]
 
     name: ClassVar[str] = "velocity"

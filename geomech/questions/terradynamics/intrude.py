@@ -21,7 +21,7 @@ ROUNDING = 1e-12  # over the largest force or moment
 @dataclass(frozen=True)
 class Intrude(Question):
     """Compute force and moment of grains on a moving body. The body is an outline in
-    the vertical plane or a mesh. SI units."""
+    the vertical plane or a mesh. Results are in SI units."""
 
     scene: Annotated["Intruding", Subject(loading.load_intruder, names.intruder_names)]
 
@@ -60,8 +60,8 @@ class Intrude(Question):
         return [
             *extreme_lines(result),
             f"error    {error_words(result)}",
-            f"work     {work:.4g} J of the grains on the body; "
-            f"power at most {power:.4g} W",
+            f"work     {work:.4g} J of the grains on the body; power at most "
+            f"{power:.4g} W",
         ]
 
     @staticmethod
@@ -107,7 +107,7 @@ def extreme_lines(result: Result) -> list[str]:
         least = value_words(result, name, *first_place(values, values.min()))
         greatest = value_words(result, name, *first_place(values, values.max()))
         if np.abs(values).max() < ROUNDING * largest[kind]:
-            lines.append(f"{name:8} zero to rounding")
+            lines.append(f"{name:8} zero within rounding")
         elif np.ptp(values) < ROUNDING * largest[kind]:
             lines.append(f"{name:8} {values[0]:.4g} {unit} throughout")
         else:
@@ -137,7 +137,9 @@ def error_words(result: Result) -> str:
     moment = float(result["largest_moment_error"])
     parts = result.attributes["parts"]
     if not math.isfinite(force):
-        return f"not known: finer {parts} are more than it takes"
+        return (
+            f"unknown: a finer computation would exceed the largest number of {parts}"
+        )
     count = int(result["finest_parts"].values)
     sizes = f"force {force:.1g} N, moment {moment:.1g} N m"
-    return f"{sizes} at most, from up to {count:,} {parts}"
+    return f"{sizes} at most, estimated with up to {count:,} {parts}"

@@ -14,19 +14,19 @@ HELP = "name (see 'geomech scenes'), TOML or CSV of plate drags"
 
 @dataclass(frozen=True)
 class Stress(Question):
-    """Compute the stress of grains on a plate per unit depth. In N/cm^3, backwards
-    (alpha_x) and upwards (alpha_z), as in Fig. 7."""
+    """Compute the stress of grains on a plate per unit depth. The stresses are
+    backwards (alpha_x) and upwards (alpha_z), in N/cm^3, as in Fig. 7."""
 
     medium: Annotated[
         str, Subject(loading.as_typed, names.medium_names, (), "MEDIUM", HELP)
     ]
     beta: Annotated[
         float | None,
-        Option("tilt of the plate in degrees, 0 if it lies flat", "ANGLE"),
+        Option("tilt of the plate in degrees (0 lies flat)", "ANGLE"),
     ] = None
     gamma: Annotated[
         float | None,
-        Option("direction of motion in degrees below the horizontal", "ANGLE"),
+        Option("direction of motion, degrees below the horizontal", "ANGLE"),
     ] = None
     # Whether the map of all angles is computed, for pictures.
     drawn: bool = field(default=True, kw_only=True)

@@ -26,7 +26,7 @@ def write_film(
     path: Path,
     result: Result,
     *,
-    follow: Annotated[bool, Option("the camera of the film goes with the robot")] = (
+    follow: Annotated[bool, Option("let the camera of the film follow the robot")] = (
         False
     ),
 ) -> None:
@@ -38,12 +38,13 @@ def write_film(
 
 @dataclass(frozen=True)
 class Walk(Question):
-    """Compute how a robot walks on grains. The mean speed has an error; the motion
-    begins at rest. SI units, pitch in rad, nose down."""
+    """Compute how a robot walks on grains. The robot starts from rest, and its mean
+    speed has an estimated error. Results are in SI units; pitch is in rad, positive
+    nose down."""
 
     scene: Annotated["WalkerScene", Subject(loading.load_walker, names.walker_names)]
     engine: Annotated[
-        str | None, Option("planar or mujoco, in place of the scene's", "ENGINE")
+        str | None, Option("planar or mujoco, instead of the scene's", "ENGINE")
     ] = None
 
     name: ClassVar[str] = "walk"
@@ -81,7 +82,7 @@ class Walk(Question):
         name = result.attributes["scene"]
         status = str(result["status"].values)
         speed = scalar(result["speed"])
-        cycle = "no limit cycle found: mean of what there is"
+        cycle = "no limit cycle found: mean over the computed time"
         if result["periodic"].values:
             cycle = f"limit cycle{settling_words(result)}"
         frequency = float(result["frequency"])
@@ -103,18 +104,21 @@ class Walk(Question):
         share = 100 * float(result["unaccounted"])
         lines = [
             motion_words(result),
-            f"of the error {steps:.1g} m/s are of the steps, {elements:.1g} m/s of the"
-            " elements",
-            f"not accounted for, by the steps: {share:.2g} % of the work",
+            f"of the error, {steps:.1g} m/s come from the steps and {elements:.1g} "
+            "m/s from the elements",
+            (
+                f"energy balance of the steps: {share:.2g} % of the work is "
+                "unaccounted for"
+            ),
         ]
         unsolved = int(result["unsolved"].values)
         if unsolved:
             residual = float(result["residual"])
             speed_error = float(result["speed_error_of_unsolved"])
             lines.append(
-                f"{unsolved} steps were taken unsolved, off by up to {residual:.1g} "
-                f"m/s, which moves the speed by {speed_error:.1g} m/s: "
-                "raise [numerics] steps or rounding"
+                f"{unsolved} steps did not converge, with residuals up to "
+                f"{residual:.1g} m/s, which change the speed by {speed_error:.1g} "
+                "m/s: raise [numerics] steps or rounding"
             )
         return lines
 
@@ -122,7 +126,7 @@ class Walk(Question):
     def draw(
         result: Result,
         *,
-        strip: Annotated[bool, Option("draw the last cycle in pictures")] = False,
+        strip: Annotated[bool, Option("draw pictures of the last cycle")] = False,
     ) -> Any:
         """Draw speed, height and pitch in time, and the robot at its end, or the last
         cycle in pictures; return the Figure."""
@@ -142,10 +146,10 @@ def settling_words(result: Result) -> str:
     time = float(result["settling_time"])
     within = f"within {100 * NEAR:g} % of it"
     if math.isinf(time):
-        return f"; from rest it does not come {within}"
+        return f"; starting from rest it does not come {within}"
     if time == 0:
         return f"; {within} from the start"
-    return f"; from rest {within} after {time:.2g} s"
+    return f"; starting from rest it is {within} after {time:.2g} s"
 
 
 def motion_words(result: Result) -> str:

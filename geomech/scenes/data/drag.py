@@ -140,7 +140,7 @@ def sizes(source: Rows) -> dict[str, float]:
             raise Refusal(
                 f"{comma[1]} in the header lines may be one number or two",
                 where=source.name,
-                instead="write a decimal point, or a blank after the comma",
+                instead="write a decimal point, or a space after the comma",
             )
     values_by_name: defaultdict[str, set[float]] = defaultdict(set)
     is_bulk = False  # the density is that of the bed, not of the grains
@@ -160,7 +160,7 @@ def sizes(source: Rows) -> dict[str, float]:
             raise Refusal(
                 f"the header lines give {name} = {listed}",
                 where=source.name,
-                instead="keep one",
+                instead="keep one of them",
             )
         if found:
             values[name] = found.pop()

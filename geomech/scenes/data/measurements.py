@@ -38,7 +38,7 @@ def read(path: str | Path, scene: Scene, angle: bool = False) -> dict[str, np.nd
     table = source.numbers(source.words)
     if not len(table):
         raise Refusal(
-            "it has no measurement",
+            "it has no measurements",
             where=source.name,
             instead=f"add rows below the header {HEADER}",
         )
@@ -112,12 +112,12 @@ def _scale(name: str, unit: str, units: dict[str, float], owner: str) -> float:
     because = ""
     if unit in METRES and "BL" in units:
         because = f"lengths of {owner} are in body lengths"
-    cure = f"give {name} alone, it has no unit here"
+    cure = f"write {name} without a unit"
     spellings = [f"{name}_{x}" for x in units if x]
     if spellings:
         cure = f"give {' or '.join(spellings)}"
     raise Refusal(
-        f"column {name}_{unit} has another unit than the scene's",
+        f"the unit of column {name}_{unit} differs from the scene's",
         because=because,
         instead=cure,
     )

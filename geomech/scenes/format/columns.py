@@ -52,10 +52,10 @@ def columns(
         if unknown or not {*required} <= {*places}:
             what = f"the header must be {header}"
             if optional:
-                what += f", and {','.join(optional)} if wanted"
+                what += f", and {','.join(optional)} if needed"
             because = source.header_text
             if unknown and because:
-                because += f", of which {formatted(unknown[0])} is none of these"
+                because += f", but {formatted(unknown[0])} is not one of these"
             raise Refusal(what, where=source.place, because=because)
         values, notes = source.values(places)
         source.issue(notes)

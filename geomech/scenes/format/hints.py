@@ -21,13 +21,13 @@ EXPECTED = {  # msgspec's names of types, in words
 LONGEST = 1000  # letters of a line in which a cure is looked for
 RULES = (  # patterns of lines that are not TOML, with their cures
     (r"[“”„«»‘’]", 'put text in straight "quotes"'),
-    (r"=\s*[-+]?\.\d", "a number has a digit before its point"),
-    (r"=\s*[-+]?\d+,\d+\s*$", "a number has a point, no comma"),
+    (r"=\s*[-+]?\.\d", "a number needs a digit before its decimal point"),
+    (r"=\s*[-+]?\d+,\d+\s*$", "a number has a decimal point, not a comma"),
     (
         r"=\s*[-+]?[\d.]+\s*(deg|°)",
-        "a number has no unit: a key that ends in _deg takes degrees",
+        "write numbers without a unit: a key that ends in _deg takes degrees",
     ),
-    (r"=\s*[-+]?[\d.]+\s*[A-Za-z]", "a number has no unit"),
+    (r"=\s*[-+]?[\d.]+\s*[A-Za-z]", "write numbers without a unit"),
     (r"=\s*[A-Za-z][^\"]*$", 'put text in "quotes"'),
     (r"=\s*$", "give the key a value"),
     (r"^[^\"=]*:", "write KEY = VALUE"),
@@ -62,13 +62,13 @@ def value_hint(message: str, table: Mapping, kind: type) -> str:
     if mismatch:
         expected, key, indices = mismatch.groups()
         value = _value_at(table, key, indices)
-        return f"give {EXPECTED.get(expected, expected)} in place of {formatted(value)}"
+        return f"give {EXPECTED.get(expected, expected)} instead of {formatted(value)}"
     key = message.partition(" must ")[0]
     if key == "frame":
-        return "name one of these, or 'minimum-perturbation'"
+        return "use one of these, or 'minimum-perturbation'"
     is_finite = is_number(table.get(key)) and abs(table[key]) < float("inf")
     if is_finite and key in angles_of(kind):
-        return f"{key} is in rad, write {key}_deg for degrees"
+        return f"{key} is in rad; write {key}_deg for degrees"
     return ""
 
 

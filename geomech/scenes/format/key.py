@@ -200,22 +200,24 @@ def meanings(kind: type) -> dict[str, tuple[str, str]]:
 def _meanings_in(paragraph: str, fields: set[str]) -> dict[str, tuple[str, str]]:
     """Return (unit, meaning) of the fields that a paragraph describes, by name."""
     found = {}
+    paragraph = " ".join(paragraph.split())
     marks = [m for m in MARK.finditer(paragraph) if {*m[1].split(", ")} <= fields]
     ends = [*(mark.start() for mark in marks[1:]), len(paragraph)]
     for mark, end in zip(marks, ends):
-        meaning = " ".join(paragraph[mark.end() : end].split())
+        meaning = paragraph[mark.end() : end]
         for name in mark[1].split(", "):
             found[name] = (mark[2], meaning.rstrip(" .;").replace("`", ""))
     return found
 
 
 def first_sentence(kind: type) -> str:
-    """Return the first sentence of a class's docstring; "" where it describes a key."""
+    """Return the first sentence of a class's docstring; "" where it describes a key,
+    and without a docstring."""
     paragraph = inspect.cleandoc(kind.__doc__ or "").partition("\n\n")[0]
     paragraph = paragraph.replace("`", "")
-    if MARK.match(paragraph):
+    if not paragraph or MARK.match(paragraph):
         return ""
-    # A full stop after an abbreviation ends no sentence.
-    sentence_end = r"(?<!Fig\.)(?<!Eqs\.)(?<!Eq\.)(?<!Sec\.)(?<=[.:;])\s"
+    # Neither an abbreviation nor an ellipsis ends a sentence.
+    sentence_end = r"(?<!Fig\.)(?<!Eqs\.)(?<!Eq\.)(?<!Sec\.)(?<!\.\.\.)(?<=[.:;])\s"
     sentence = re.split(sentence_end, " ".join(paragraph.split()))[0]
     return f"{sentence.rstrip('.:;')}."

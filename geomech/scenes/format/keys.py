@@ -90,7 +90,7 @@ def _naming_key(name: str, section: OneOf) -> Part:
     names = {"type": "string", "enum": [*section.kinds]}
     key = Key(section.key, names, "-", section.meaning, False, None, False)
     title = f"[{name}] of {section.owner}"
-    return Part(title, "Besides the keys above.", [key])
+    return Part(title, "A key in addition to those above.", [key])
 
 
 def all_variants(section: Section) -> list[Variant]:
@@ -111,7 +111,7 @@ def _part(name: str, section: Section, variant: Variant) -> Part:
     about = [first_sentence(variant.kind)]
     if isinstance(section, OneOf) and section.short in variant.named.values():
         inner = ", ".join(_header(x, part) for x, part in variant.inner.items())
-        about.append(f"Its tables, {inner}, may as well stand by themselves.")
+        about.append(f"Its tables, {inner}, may also be written without this section.")
     elif variant.inner:
         inner = " and ".join(f"[{name}.{part}]" for part in variant.inner)
         listed_in = "intruder"
@@ -119,9 +119,11 @@ def _part(name: str, section: Section, variant: Variant) -> Part:
             if part in SWIMMER:
                 listed_in = part
                 break
-        about.append(f"'geomech reference {listed_in}' has the keys of {inner}.")
+        about.append(
+            f"The keys of {inner} are listed by 'geomech reference {listed_in}'."
+        )
     if variant.implied:
-        about.append(f"It need not say its {section.key}.")
+        about.append(f"The key {section.key} may be left out.")
     title = f"{_header(name, section)} {variant.label}".strip()
     if section.owner:
         title += f" of {section.owner}"
@@ -135,12 +137,12 @@ def _package_parts(section: Section, entries: EntryPoints) -> Iterator[Part]:
         return
     new, refused = unloaded(registry, entries)
     for name, package in new.items():
-        about = f"Of {package}, which is loaded when a scene asks for it."
+        about = f"Provided by {package}, which is loaded when a scene uses it."
         yield Part(f'{section.key} = "{name}"', about, [])
     for name, package in refused.items():
         about = (
-            f"Not that of {package}, which is refused: the one that is built in has "
-            "this name."
+            f"Provided by {package}, but not used: the built-in part of this name "
+            "takes precedence."
         )
         yield Part(f'{section.key} = "{name}"', about, [])
 

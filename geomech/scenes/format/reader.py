@@ -201,9 +201,9 @@ def _from_file(place: str, table: dict, variant: Variant) -> dict:
     """Return the keys of a section with the values of its file in place of the file."""
     if not variant.file.keys and {*table} != {"file"}:
         raise Refusal(
-            f"{variant.label} takes 'file' and nothing else",
+            f"{variant.label} with the key 'file' takes no other key",
             where=place,
-            because=f"a {variant.file.meaning}",
+            because=f"it reads a {variant.file.meaning}",
         )
     if "file" not in table:
         return table
@@ -304,8 +304,8 @@ def _check_degrees(place: str, value) -> None:
     to twenty degrees."""
     if isinstance(value, (int, float)) and 0 < value < 1:
         text = (
-            f"{place} = {value:g} is less than a degree: if that is in rad, write "
-            f"gamma0 = {value:g}"
+            f"{place} = {value:g} is less than one degree: if the value is in rad, "
+            f"write gamma0 = {value:g}"
         )
         warnings.warn(text, UnitWarning, stacklevel=2)
 

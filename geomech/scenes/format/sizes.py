@@ -19,11 +19,11 @@ NOT_OF_THE_BODY = {
 
 @dataclasses.dataclass(frozen=True)
 class Physical:
-    """Sizes that a body and its effects share, given once for all that have them.
+    """Sizes that the body and the effects share, given once for all of them.
 
-    length (m): of the body. frequency (1/s): cycles per second. mass (kg): of the body.
-    radius (body lengths): of the body. radius_m (m): of a body with a length, in place
-    of radius.
+    length (m): length of the body. frequency (1/s): cycles per second. mass (kg): mass
+    of the body. radius (body lengths): radius of the body. radius_m (m): radius of a
+    body with a length, instead of radius.
     """
 
     length: float | None = None
@@ -67,7 +67,7 @@ class Sizes:
             raise Refusal(
                 f"{key} = {value!r}, but {self.places[key]} = {given!r}",
                 where=place,
-                instead="keep one",
+                instead="keep one of them",
             )
 
     def fill(self, place: str, table: dict, kind: type) -> dict:
@@ -90,6 +90,6 @@ class Sizes:
             raise Refusal(
                 key if key == "frame" else f"[physical] {key}",
                 where=self.name,
-                because="nothing in this scene has one",
-                instead="drop it, or add what has",
+                because="no part of this scene uses it",
+                instead="remove it, or add a part that uses it",
             )

@@ -30,17 +30,17 @@ from rft.terradynamics.plates.loads import ORDER
 
 POINTS = FromFile(
     rows_reader("points", ("x", "z")),
-    "CSV with the header x,z (m), in place of points",
+    "CSV with the header x,z (m), instead of points",
     ("points",),
 )
 COURSE = FromFile(
     columns_reader(("t", "x", "z"), ("angle",)),
-    "CSV with the header t,x,z or t,x,z,angle (s, m, rad); velocities are differences "
-    "of order 2 in the spacing of t",
+    "CSV with the header t,x,z or t,x,z,angle (s, m, rad); velocities are finite "
+    "differences, with an error of order 2 in the spacing of t",
 )
 ELEMENTS = (
-    "of the outline, about, 1 to 5000; the error is of order 2 in their number, 1 with "
-    "tension cut"
+    "approximate number of elements of the outline, 1 to 5000; the error is of order "
+    "2 in this number, or of order 1 with tension cut"
 )
 OUTLINES = OneOf(SHAPES, files={"polygon": POINTS, "spline": POINTS})
 

@@ -52,7 +52,7 @@ def read(source: Rows) -> Penetration:
         raise Refusal(
             "the header has two columns of depth",
             where=source.place,
-            instead="keep one",
+            instead="keep one of them",
         )
     for name, spellings in (("depth", {"depth", "z"}), ("force", {"force"})):
         if not spellings & {*places}:
@@ -68,7 +68,7 @@ def read(source: Rows) -> Penetration:
         depth = values["depth"]
         word, _ = split_unit(source.words[places["depth"].index])
         if plain(word) not in ("depth", "penetration_depth"):
-            notes = (*notes, f"{word} is taken for the depth")
+            notes = (*notes, f"{word} is assumed to be the depth")
     else:
         depth = -values["z"]
     source.issue(notes)
@@ -77,9 +77,9 @@ def read(source: Rows) -> Penetration:
     if area_of_header is not None:
         if area is not None:
             raise Refusal(
-                "the area is given in a column and in a header line",
+                "the area is given both in a column and in a header line",
                 where=source.name,
-                instead="keep one",
+                instead="keep one of them",
             )
         area = np.array([area_of_header])
     return Penetration(depth, values["force"], area, source.name)
@@ -108,7 +108,7 @@ def _area(source: Rows) -> float | None:
         raise Refusal(
             f"the header lines give areas {listed} m^2",
             where=source.name,
-            instead="keep one",
+            instead="keep one of them",
         )
     return areas.pop() if areas else None
 

@@ -39,10 +39,11 @@ KINDS = {
 COURSE = FromFile(
     columns_reader(("t", "x", "y", "z"), ("rx", "ry", "rz")),
     "CSV with the header t,x,y,z or t,x,y,z,rx,ry,rz (rotation vector) (s, m, rad); "
-    "velocities are differences of order 2 in the spacing of t",
+    "velocities are finite differences, with an error of order 2 in the spacing of t",
 )
 TRIANGLES = (
-    "of the mesh, about, 1 to 2,000,000; a mesh from a file has at least its own"
+    "approximate number of triangles of the mesh, 1 to 2,000,000; a mesh from a "
+    "file has at least its own"
 )
 
 

@@ -59,12 +59,12 @@ _Coefficients = dataclasses.make_dataclass(
 
 @dataclass(frozen=True)
 class StressKeys(_Coefficients):
-    """Give one of name, file and all nine coefficients, or zeta alone, which is that of
-    the generic set.
+    """Give one of name, file and all nine coefficients, or zeta alone, which then
+    multiplies the generic set.
 
-    file (-): TOML with such a table, or CSV of plate drags with the header
-    beta,gamma,alpha_x,alpha_z (degrees, N/cm^3). tension (-): "keep", or "cut" for no
-    stress on faces that the map pulls on.
+    file (-): name of a TOML file with such a table, or of a CSV file of plate drags
+    with the header beta,gamma,alpha_x,alpha_z (degrees, N/cm^3). tension (-): "keep",
+    or "cut" for no stress on faces on which the map pulls.
     """
 
     zeta: Annotated[
@@ -73,7 +73,7 @@ class StressKeys(_Coefficients):
             0,
             1e6,
             "-",
-            "strength of the medium, which multiplies what its other keys say",
+            "strength of the medium, by which its other coefficients are multiplied",
         ),
     ] = 1.0
     name: Named = None
@@ -88,8 +88,8 @@ class StressKeys(_Coefficients):
             ({*COEFFICIENTS}, {"zeta"}),
             ({"zeta"}, set()),
         ),
-        "keep one of 'name', 'file' and the nine coefficients, in N/cm^3; or give zeta "
-        "alone, times the generic set (zeta = 1 is the generic set)",
+        "use one of 'name', 'file' and the nine coefficients, in N/cm^3; or zeta "
+        "alone, which multiplies the generic set (zeta = 1 is the generic set itself)",
         "strength",
     )
 
@@ -114,18 +114,22 @@ class StressKeys(_Coefficients):
 
 @dataclass(frozen=True)
 class SpatialKeys(Spatial):
-    """Give one of name, file (either with zeta, if wanted), xi_n, and density with
+    """Give one of name or file (optionally with zeta), xi_n, and density with
     internal_friction.
 
-    file (-): TOML with a table [medium] of the vertical plane, or CSV of plate drags
-    with the header beta,gamma,alpha_x,alpha_z (degrees, N/cm^3).
+    file (-): name of a TOML file with a table [medium] of the vertical plane, or of a
+    CSV file of plate drags with the header beta,gamma,alpha_x,alpha_z (degrees,
+    N/cm^3).
     """
 
     xi_n: _optional_field(Spatial, "xi_n") = None  # type: ignore[valid-type]
     name: Named = None
     file: str | None = None
     zeta: Annotated[
-        float, Number(0, 1e6, "-", "times the strength of the name or file")
+        float,
+        Number(
+            0, 1e6, "-", "factor on the strength of the medium given by name or file"
+        ),
     ] = 1.0
     density: Annotated[
         float | None,
@@ -133,8 +137,8 @@ class SpatialKeys(Spatial):
             1,
             1e5,
             "kg/m^3",
-            "critical density of the grains, 1 to 1e5; with internal_friction, in "
-            "place of xi_n",
+            "critical density of the grains, 1 to 1e5; together with "
+            "internal_friction, instead of xi_n",
         ),
     ] = None
     internal_friction: Annotated[
@@ -143,8 +147,8 @@ class SpatialKeys(Spatial):
             0.05,
             1.5,
             "-",
-            "mu, tan of the angle of repose of the grains, 0.05 to 1.5; with density, "
-            "in place of xi_n",
+            "mu, the tangent of the angle of repose of the grains, 0.05 to 1.5; "
+            "together with density, instead of xi_n",
         ),
     ] = None
     makes = Spatial
@@ -153,7 +157,7 @@ class SpatialKeys(Spatial):
         ["density", "internal_friction"],
         more=["zeta"],
         cure="give 'xi_n' (N/m^3), or 'density' and 'internal_friction', or 'name' or "
-        "'file' and, if wanted, 'zeta'",
+        "'file', which may be combined with 'zeta'",
     )
 
     def to_part(self, source: Source, place: str, given: Collection[str]) -> Spatial:
@@ -207,7 +211,7 @@ def plate_rows(place: str, file) -> np.ndarray:
     largest = np.abs(rows[:2]).max(initial=0.0)
     if rows.size and largest < LARGEST_RADIANS:
         raise Refusal(
-            "beta and gamma look like radians",
+            "beta and gamma appear to be in radians",
             where=(place, Path(file).name),
             instead="give degrees",
         )

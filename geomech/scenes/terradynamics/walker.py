@@ -24,7 +24,7 @@ from rft.terradynamics.walking import (
     Walker,
 )
 
-ATTACH = "use rft.mujoco.attach(model, medium, {} = ...) in a loop of your own"
+ATTACH = "use rft.mujoco.attach(model, medium, {} = ...) in your own loop"
 ELSEWHERE = {
     "slope": ATTACH.format("slope"),
     "disturbed-ground": ATTACH.format("footprints"),
@@ -36,8 +36,8 @@ SPATIAL_KEYS = {"xi_n", "density", "internal_friction", "surface_friction"}
 LEGS = {"legs": OUTLINES}
 SCREW = {"screw": OneOf({"screw": Screw}, implied=("screw",))}
 LAW = (
-    "stress maps of the vertical plane, or the law of three dimensions, for the engine "
-    "mujoco; if left out what the keys tell"
+    "stress maps of the vertical plane, or the law of three dimensions for the engine "
+    "mujoco; if left out, the other keys decide"
 )
 OWNER = "a robot that walks"
 
@@ -123,7 +123,7 @@ def with_implied_names(tables: Mapping, name: str) -> dict:
             "[robot]",
             where=name,
             because=f"kind = {formatted(robot['kind'])} has sizes, mjcf a file",
-            instead="drop one",
+            instead="remove one of them",
         )
     if isinstance(robot.get("screw"), Mapping):
         robot["screw"] = {"kind": "screw", **robot["screw"]}
@@ -144,6 +144,6 @@ def _refuse_slope(tables: Mapping, name: str) -> None:
             raise Refusal(
                 place,
                 where=name,
-                because="a walking scene has level ground",
+                because="a walking scene must have level ground",
                 instead=ELSEWHERE["slope"],
             )

@@ -4,17 +4,17 @@ One file each: ``geomech NAME`` is the function of that name in the module of th
 with the texts that it prints. A command here is a file and a line below.
 """
 
-# By the headings of `geomech --help`, as in `geomech.questions`. The lines are given
-# here, too, so that the list of commands loads none of them.
+# By the headings of `geomech --help-all`, as in `geomech.questions`. The lines are
+# given here so that the list of commands loads none of them.
 GROUPS = {
     "Analyse": {
         "symbolic": "Print connection and CCF in closed form.",
-        "lab": "Make a page to draw loops on the CCF and watch the swimmer.",
+        "lab": "Write a page to draw loops on the CCF and watch the swimmer.",
     },
     "Reference": {
         "scenes": "List the built-in scenes and the named media.",
         "reference": "Print every key of a scene file.",
-        "explain": "Print effects and engine of a scene, and what they cost.",
+        "explain": "Print effects, engine and cost of a scene.",
     },
 }
 SUMMARIES = {name: line for lines in GROUPS.values() for name, line in lines.items()}

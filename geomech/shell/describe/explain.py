@@ -9,8 +9,8 @@ from geomech.shell.options import SceneArgument
 
 
 def explain(name: SceneArgument) -> None:
-    """Print effects and engine of a scene, and what they cost. Results that the effects
-    rule out are listed."""
+    """Print effects, engine and cost of a scene. It also lists the results that
+    the effects rule out."""
     # The mechanics of scenes takes longer to load than the help of this command.
     from geomech.scenes import load
     from geomech.shell.describe.scene import description

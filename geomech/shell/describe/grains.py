@@ -38,7 +38,7 @@ def scene_lines(scene: Intruding | WalkerScene) -> list[str]:
     return [
         *lines,
         *effect_lines(scene.effects),
-        f"off, not evaluated: {', '.join(off) or 'none'}",
+        f"off (not evaluated): {', '.join(off) or 'none'}",
     ]
 
 

@@ -26,7 +26,7 @@ def lab(
             metavar="[SCENE]...",
             show_default=False,
             autocompletion=scene_names,
-            help="built-in scenes or files; a gallery of six if left out",
+            help="built-in scenes or files; a gallery of six by default",
         ),
     ] = None,
     out: Annotated[
@@ -35,21 +35,21 @@ def lab(
             "-o",
             "--output",
             metavar="FILE.html",
-            help="write the page; if left out it opens in the browser",
+            help="write the page to a file instead of opening it",
         ),
     ] = None,
     over: Annotated[
         Optional[list[str]],
         typer.Option(
             metavar="KEY=VALUES",
-            help="vary this parameter of the first scene by a slider",
+            help="add a slider for this parameter of the first scene",
         ),
     ] = None,
     yes: YesOption = False,
 ) -> None:
-    """Make a page to draw loops on the CCF and watch the swimmer. It is one file, which
-    needs no network and nothing installed: map, swimmer, and displacement of a cycle by
-    three tiers with their errors."""
+    """Write a page to draw loops on the CCF and watch the swimmer. The page is one
+    file that needs no network and no installation; it shows the map, the swimmer, and
+    the displacement per cycle by three tiers with their errors."""
     # The mechanics of scenes takes longer to load than the help of this command.
     from geomech.lab import check_format, page_path, write
     from geomech.studies.maps.lab import GALLERY, Lab

@@ -18,7 +18,7 @@ def reference(
         Optional[str],
         typer.Argument(
             metavar="[SECTION]",
-            help="section such as medium, body or gait; all if left out",
+            help="section such as medium, body or gait (default all)",
             autocompletion=section_names,
         ),
     ] = None,
@@ -42,6 +42,6 @@ def keys(section: str | None, json_schema: bool) -> str:
         return text(section).removesuffix("\n")
     if section is not None:
         raise Refusal(
-            "--json-schema is that of whole scene files", instead="drop SECTION"
+            "--json-schema describes whole scene files", instead="drop SECTION"
         )
     return json.dumps(schema(), indent=1)

@@ -66,8 +66,8 @@ def cost_lines(scene: Scene) -> Iterator[str]:
     solved = solved_phases(system, scene.gait, phases)
     if solved < phases:
         yield (
-            f"by symmetry: {solved} of {phases} phases of the gait are solved, the "
-            "others are images of these"
+            f"by symmetry: {solved} of {phases} phases of the gait are solved, and "
+            "the others are their images"
         )
     elements = n_elements(system)
     fewer: list = []
@@ -77,8 +77,9 @@ def cost_lines(scene: Scene) -> Iterator[str]:
         share = sum(1 / other.ratio for other in fewer) / 4
         numbers = " and ".join(f"{n_elements(other.system)}" for other in fewer)
         yield (
-            f"errors: contain the change from {elements} to {numbers} elements, at a "
-            f"quarter of the phases: {share:.0%} of the cost of the displacement"
+            f"errors: estimated from {elements} elements against {numbers} elements, "
+            f"at a quarter of the phases, for {share:.0%} of the cost of the "
+            "displacement"
         )
 
 
@@ -90,7 +91,7 @@ def tiers_line(system: System) -> str:
         if tier.is_possible(system) and not tier.is_offered(system):
             by_name.append(name)
     if by_name:
-        words = f"{words}; by name: {', '.join(by_name)}"
+        words = f"{words}; only by name: {', '.join(by_name)}"
     return words
 
 
@@ -106,8 +107,7 @@ def missing_lines(system: System) -> list[str]:
         reasons["a loop of one joint encloses no area"] = ["CCF maps"]
     elif system.joints > LARGEST_MAPPED:
         slices = (
-            f"of {system.joints} joints there are slices, pair by pair "
-            "(geomech ccf --pair)"
+            f"{system.joints} joints have slices, pair by pair (geomech ccf --pair)"
         )
         reasons[slices] = ["CCF maps"]
     for tier in TIERS.values():
@@ -132,7 +132,7 @@ def result_names(results: list[str]) -> str:
 
 def missing_premises(system: System) -> str:
     """Return the reason why a system has no connection."""
-    return f"{premises.listed(system, ALL)} takes away what they rest on"
+    return f"{premises.listed(system, ALL)} breaks an assumption that they need"
 
 
 def why_no_tier(tier: Any, system: System) -> str:
@@ -142,11 +142,11 @@ def why_no_tier(tier: Any, system: System) -> str:
     if system.joints not in tier.joints:
         first = tier.joints[0]
         last = tier.joints[-1]
-        taken = f"{first} joints and more"
+        taken = f"{first} or more joints"
         if last < ANY_NUMBER:
             taken = f"{first} to {last} joints"
-        return f"they take {taken}, this body has {system.joints}"
+        return f"they need {taken}; this body has {system.joints}"
     return (
         f"the field has singular shapes, where {system.traits.singular}; maps and "
-        "files leave these out, and gaits that meet one are refused"
+        "files leave these out, and gaits that pass one are refused"
     )

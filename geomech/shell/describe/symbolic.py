@@ -23,11 +23,11 @@ def symbolic(
     name: SceneArgument,
     latex: Annotated[bool, typer.Option("--latex", help="print LaTeX")] = False,
     ccf: Annotated[
-        bool, typer.Option(help="print the CCF of every two joints, too")
+        bool, typer.Option(help="also print the CCF of every pair of joints")
     ] = True,
 ) -> None:
-    """Print connection and CCF in closed form. Chains in a viscous or ideal fluid,
-    afloat and on wheels have one."""
+    """Print connection and CCF in closed form. It exists for chains in a viscous or
+    ideal fluid, floating chains, and chains on wheels."""
     terminal.show(formulas(load_scene(name), ccf, latex))
 
 

@@ -22,7 +22,7 @@ from rft.formulas.quadrature import QUADRATURE
 from rft.laws import LAWS
 from rft.laws.records import record
 
-NO_PREMISE_BROKEN = "nothing remembers, places are alike, no mass"
+NO_PREMISE_BROKEN = "no memory, no dependence on place, no mass"
 
 
 def system_lines(system: System) -> list[str]:
@@ -52,7 +52,7 @@ def engine(system: System) -> str:
     if isinstance(system, Framed):
         return engine(system.inner)
     if isinstance(system, Table):
-        return "algebraic (the velocity at every shape, looked up)"
+        return "algebraic (the velocity at every shape, interpolated from a table)"
     if not isinstance(system, Swimmer):
         return (
             "algebraic (the velocity at every shape, all shapes at once): "
@@ -76,11 +76,12 @@ def notes(system: System) -> tuple[str, ...]:
     if system.closed or system.solver.loads != "exact":
         return ()
     return (
-        f"the law {name_in(LAWS, system.medium)} has no closed form: its averages over "
-        f"an element are by quadrature ({QUADRATURE}) in place of exact integrals, "
-        "which takes some five times as long and, where drag is dry, is off by 1 to 7 "
-        "% of the displacement of three links, less of more; errors include it, and "
-        '[numerics] loads = "gauss:96" lowers it tenfold',
+        f"the law {name_in(LAWS, system.medium)} has no closed form: its averages "
+        f"over an element are computed by quadrature ({QUADRATURE}) instead of exact "
+        "integrals. This takes about five times as long and, where drag is dry, "
+        "changes the displacement of three links by 1 to 7 %, and of more links by "
+        'less; errors include this, and [numerics] loads = "gauss:96" reduces it '
+        "tenfold",
     )
 
 
@@ -96,7 +97,7 @@ def swimmer_lines(system: Swimmer) -> list[str]:
     law_record = record(system.medium, system.solver.loads)
     return [
         *lines,
-        f"off, not evaluated: {', '.join(off) or 'none'}",
+        f"off (not evaluated): {', '.join(off) or 'none'}",
         f"back end: {system.solver.computed(law_record, law)}",
     ]
 
@@ -113,19 +114,19 @@ def medium_and_body(swimmer: Swimmer, link: str) -> str:
 def effect_lines(effect: Effect, system: Swimmer) -> list[str]:
     """Return an effect with the premises that it breaks, its cost and its limit; its
     sizes for this body; and its assumptions."""
-    premises = negation(effect.breaks) or "keeps every premise"
+    premises = negation(effect.breaks) or "breaks no assumption"
     line = f"on:  {summary.part(effect.kind, effect)}; {premises}"
     if effect.cost:
-        line = f"{line}; costs {effect.cost}"
+        line = f"{line}; cost: {effect.cost}"
     if effect.limit:
-        line = f"{line}; gone at {effect.limit}, order {effect.order}"
+        line = f"{line}; vanishes at {effect.limit} (order {effect.order})"
     lines = [line]
     sizes = effect_sizes(effect, system.body)
     if sizes:
         lines.append(f"     {sizes}")
     assumed = effect.assumes(system.medium)
     if assumed:
-        lines.append(f"     assumes {assumed}")
+        lines.append(f"     assumption: {assumed}")
     return lines
 
 
@@ -138,19 +139,21 @@ def table_lines(system: Table) -> list[str]:
         field_line(system),
     ]
     if stored.even is not None:
-        lines.append("xi is not odd in alphadot: what is even is part of every error")
+        lines.append(
+            "xi is not odd in alphadot: its even part is included in every error"
+        )
     if stored.A_error is not None and system.tube is None:
-        lines.append("its file tells intervals of A: they are part of every error")
+        lines.append("the file gives intervals of A: they are included in every error")
     if not stored.has_residual:
         lines.append(
-            "the file does not tell what its fit left: errors are those of the grid "
-            "alone"
+            "the file does not give the residual of its fit: errors are those of the "
+            "grid alone"
         )
     if stored.computed is not None:
         lines += comparison_lines(system)
     if system.swimmer:
         parts = medium_and_body(system.swimmer, " on ")
-        lines.append(f"changes of shape cost the drag of {parts}")
+        lines.append(f"the cost of changing shape is the drag of {parts}")
     frame = stored.frame
     original_frame = system.original.frame
     if frame != original_frame:
@@ -161,7 +164,7 @@ def table_lines(system: Table) -> list[str]:
         f"{stored.unit}, frame {frame}",
         *system.assumed,
         "its field has the grid of the file; [numerics] grid, extent and directions "
-        "say nothing",
+        "have no effect",
     ]
 
 
@@ -172,16 +175,19 @@ def field_line(system: Table) -> str:
     if system.tube is not None:
         level = system.tube.taylor.level
         return (
-            "known near a measured gait alone; errors are those of "
-            f"{level:.3g} of cases"
+            f"known only near a measured gait; errors are {100 * level:.3g} % "
+            "confidence intervals"
         )
     if stored.harmonics:
         return (
-            "with the odd harmonics of xi in the direction of alphadot to "
+            "with the odd harmonics of xi in the direction of alphadot up to "
             f"{stored.highest}: {stored.harmonics!r}"
         )
     if stored.has_residual:
-        return "A alone: xi = A alphadot, and what the fit left is part of every error"
+        return (
+            "A alone: xi = A alphadot, and the residual of the fit is included in "
+            "every error"
+        )
     return "A alone: xi = A alphadot"
 
 
@@ -194,6 +200,6 @@ def comparison_lines(system: Table) -> list[str]:
     if not found:
         return []
     return [
-        "largest difference of sysplotter's own from ours, in the middle half of the "
-        f"grid: {', '.join(found)}"
+        "largest difference between sysplotter's fields and ours, in the middle half "
+        f"of the grid: {', '.join(found)}"
     ]

@@ -153,7 +153,7 @@ def _refuse_below_settling(request: _Request) -> None:
     repeated_to = settling(request.scene.system)
     if request.tol <= repeated_to:
         raise Refusal(
-            f"cycles with these effects repeat to {repeated_to:g} only",
+            f"cycles with these effects repeat only to {repeated_to:g}",
             where=request.scene.name,
             instead="raise ``tolerance``",
         )
@@ -260,12 +260,12 @@ def _refuse_inaccurate(request: _Request, answer: _Answer) -> None:
     largest = answer.error[:, 0].max()
     if largest <= request.tol:
         return
-    finer = "take a finer table"
+    finer = "use a finer table"
     if solver_of(request.scene.system):
         finer = "lower [numerics] regularisation and tolerance"
     settings = " and ".join(f"{n} {name}" for name, n in answer.settings.items())
     raise Refusal(
-        f"no tier gets to {request.tol:g} body lengths (best estimate {largest:.1e} "
+        f"no tier reaches {request.tol:g} body lengths (best estimate {largest:.1e} "
         f"with {settings})",
         where=request.scene.name,
         instead=f"raise ``tolerance``, or {finer}",

@@ -77,7 +77,7 @@ class Settings:
     )
     unit: ClassVar[str] = "BL"
     measures: ClassVar[dict[str, str]] = {
-        "error": "rms distance of positions over the amplitudes"
+        "error": "rms distance between positions over the amplitudes"
     }
 
     def __post_init__(self) -> None:
@@ -202,7 +202,7 @@ class Settings:
         label = self.scene.gait.amplitude_label
         found.append(Variable("amplitude", ("amplitude",), self.amplitudes, "", label))
         if own:
-            about = "of the system, which no setting takes away"
+            about = "error of the system itself, which no setting reduces"
             found.append(Variable("own_error", (), own, self.unit, about))
         return found
 

@@ -169,7 +169,7 @@ def _surface_variables(spread: np.ndarray, unit: str) -> list[Variable]:
     """Return how far answers differ between surfaces that a loop spans, from (tiers,
     amplitudes, 2): in position and heading."""
     position, heading = SURFACE
-    label = "how far surfaces that a loop spans differ"
+    label = "difference between surfaces that the loop spans"
     return [
         Variable(position, DIMS, spread[..., 0], unit, label),
         Variable(heading, DIMS, spread[..., 1], "rad", label),
@@ -179,7 +179,7 @@ def _surface_variables(spread: np.ndarray, unit: str) -> list[Variable]:
 def _loop_area(gait: Gait, phases: int, amplitudes: np.ndarray) -> Variable:
     """Return the area of a gait's loop in shape space at each amplitude."""
     area, error = loop_area(gait, phases, amplitudes)
-    label = "in shape space, counter-clockwise positive"
+    label = "area in shape space, counter-clockwise positive"
     return Variable("loop_area", ("amplitude",), area, "rad2", label, error)
 
 
@@ -202,7 +202,7 @@ def medium_variables(medium: Mapping, unit: str) -> list[Variable]:
     """Return the shift of the mean over uncertain media, and how their spread was
     propagated."""
     shift = np.array([medium["shift"][name] for name in QUANTITIES])
-    label = "of the mean over the media, from the displacement in their mean"
+    label = "shift of the mean over the media from the displacement in their mean"
     rule = np.array(medium["rule"], dtype="U")
     return [
         Variable("quantity", ("quantity",), [*QUANTITIES]),
@@ -230,6 +230,8 @@ def timing_variables(
     was_stored = [int(part in stored) for part in seconds]
     return [
         Variable("part", ("part",), np.array([*seconds], dtype="U")),
-        Variable("seconds", ("part",), [*seconds.values()], "s", "of computing"),
-        Variable("computed_before", ("part",), was_stored, "1", "1 if it was"),
+        Variable("seconds", ("part",), [*seconds.values()], "s", "computing time"),
+        Variable(
+            "computed_before", ("part",), was_stored, "1", "1 if it was stored already"
+        ),
     ]

@@ -72,23 +72,23 @@ def why_no_metric(system: System) -> str:
     has_power = capability(system, Dissipative) is not None
     if stored_table(system, "connection") and not has_power:
         return (
-            "no metric with this table: its file tells no power, "
-            "and the scene no medium"
+            "no metric with this table: its file gives no power, and the scene has no "
+            "medium"
         )
     if system.traits.power_degree is None:
-        reason = "nothing says what moving costs"
+        reason = "nothing defines what moving costs"
         if has_power:
-            reason = "its power is of no one degree in the rate"
+            reason = "its power is not proportional to one power of the rate"
         return f"no metric with {_responsible_parts(system)}: {reason}"
     if not is_quadratic(system) and system.joints != 2:
         return (
-            f"no metric of {system.joints} joints where power is not quadratic: "
-            "its norm is told for two"
+            f"no metric of {system.joints} joints where power is not quadratic: its "
+            "norm is available only for two"
         )
     if not _is_even(system):
         return (
-            f"no metric with {_responsible_parts(system)}: "
-            "one way costs another power than the way back"
+            f"no metric with {_responsible_parts(system)}: its power differs between "
+            "opposite directions"
         )
     return ""
 
@@ -230,11 +230,11 @@ def refuse_costless(scene: Scene) -> None:
     system = scene.system
     if any(capability(system, kind) for kind in (Dissipative, OwnMetric)):
         return
-    reason = "nothing says what moving costs"
+    reason = "nothing defines what moving costs"
     if stored_table(system, "connection"):
-        reason = "its file does not tell it"
+        reason = "its file does not give it"
     raise Refusal(
-        f"no path length or work with the {kind_of(system)}",
+        f"no path length or work for the {kind_of(system)}",
         where=scene.name,
         instead=reason,
     )

@@ -163,8 +163,8 @@ def _coarse_poses(system, alpha, alphadot) -> np.ndarray:
         return system.run(alpha, alphadot).net
     except RuntimeError as error:
         raise RuntimeError(
-            f"at {alpha.shape[-2]} phases, for the estimate of the error, {error}, "
-            "or raise [numerics] phases"
+            f"at {alpha.shape[-2]} phases, which the estimate of the error needs, "
+            f"{error}, or raise [numerics] phases"
         ) from None
 
 

@@ -46,7 +46,7 @@ class GrainSteps(Cost):
         return f"{self.balances:.1e} steps of grains, about {seconds} of computing"
 
     def check(
-        self, place: str, yes: bool, cheaper_alternative: str = "ask for less"
+        self, place: str, yes: bool, cheaper_alternative: str = "request less"
     ) -> None:
         if yes or self.seconds <= LONGEST:
             return
@@ -54,7 +54,7 @@ class GrainSteps(Cost):
         raise TooLong(
             str(self),
             where=place,
-            instead=f"to compute for more than {longest} say ``yes``, or "
+            instead=f"to compute for more than {longest} use ``yes``, or "
             f"{cheaper_alternative}",
         )
 
@@ -86,7 +86,7 @@ def store_folder(given: Path | None) -> Path:
     if folder is None:
         raise Refusal(
             "there is no cache folder for beds of grains",
-            instead="name one with ``store``",
+            instead="choose one with ``store``",
         )
     return folder / "grains"
 
@@ -127,7 +127,7 @@ class DraggedRod:
         """Refuse sizes that make no sense, and beds without the engine of grains."""
         angles = list(self.angles)
         enough = len(set(angles)) >= 3
-        require(enough, "a law takes three angles or more", value=angles)
+        require(enough, "a law needs three angles or more", value=angles)
         require(
             all(0 <= psi <= 90 for psi in angles),
             "angles must be 0 to 90 degrees",
@@ -145,7 +145,7 @@ class DraggedRod:
         require(isinstance(self.bed, Bed), "bed must be Bed(...)", value=self.bed)
         require(
             self.length >= 20 * self.radius,
-            "a rod must be ten times as long as it is wide",
+            "a rod must be at least ten times as long as it is wide",
             value=self.length,
         )
         for experiment in self.experiments()[: len(angles)]:
@@ -215,7 +215,7 @@ class DraggedRod:
         }
         over = ("bed", "attack_angle")
         by_component = ("component", *over)
-        in_time = "standard error in time"
+        in_time = "standard error over time"
         psi = np.tile(self.angles, self.beds)
         variables = [
             Variable("bed", ("bed",), self.seed + np.arange(self.beds), "1", "seed"),
@@ -227,7 +227,7 @@ class DraggedRod:
                 drags.flank_error, error_label=in_time,
             ),
             Variable(
-                "ends", by_component, drags.ends, "N", "drag on both ends beyond that",
+                "ends", by_component, drags.ends, "N", "drag on both ends in addition",
                 drags.ends_error, error_label=in_time,
             ),
             Variable(
@@ -239,9 +239,15 @@ class DraggedRod:
             variables.append(mean_over_beds(variable))
         variables += [
             Variable("rod_diameter", (), 2 * self.radius, "m"),
-            Variable("speed", (), self.speed, "m/s", "of the rod"),
+            Variable("speed", (), self.speed, "m/s", "speed of the rod"),
             Variable("packing", (), packing, "1", "mean over the beds"),
-            Variable("largest_overlap", (), overlap, "1", "in grain diameters"),
+            Variable(
+                "largest_overlap",
+                (),
+                overlap,
+                "1",
+                "largest overlap in grain diameters",
+            ),
             *fit_variables(law, psi),
         ]
         return Result("drag_grains", tuple(variables), facts)
@@ -301,7 +307,7 @@ def mean_over_beds(variable: Variable) -> Variable:
         name=f"mean_{variable.name}",
         dims=tuple(name for name in variable.dims if name != "bed"),
         values=variable.values.mean(axis),
-        label=f"{variable.label}, mean over beds",
+        label=f"{variable.label}, mean over the beds",
         error=error,
         error_label=error_label,
     )

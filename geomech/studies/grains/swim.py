@@ -95,7 +95,7 @@ class GrainSwim:
         system = self.scene.system
         if not (isinstance(system, Swimmer) and isinstance(system.body, Links)):
             raise Refusal(
-                "grains take a body of rigid links",
+                "grains need a body of rigid links",
                 where=self.scene.name,
                 instead='give a scene with [body] kind = "chain"',
             )
@@ -206,9 +206,13 @@ def _scalar_variables(
         Variable("body_length", (), body.size, "m"),
         Variable("body_radius", (), body.half_width, "m"),
         Variable("frequency", (), question.frequency, "Hz"),
-        Variable("amplitude", (), question.scene.gait.amplitude, "", "of the gait"),
-        Variable("work", (), work, "J", "of the body on the grains per cycle"),
-        Variable("largest_overlap", (), overlap, "1", "in grain diameters"),
+        Variable(
+            "amplitude", (), question.scene.gait.amplitude, "", "amplitude of the gait"
+        ),
+        Variable("work", (), work, "J", "work of the body on the grains per cycle"),
+        Variable(
+            "largest_overlap", (), overlap, "1", "largest overlap in grain diameters"
+        ),
     ]
 
 
@@ -220,12 +224,20 @@ def _method_variables(methods: dict[str, Predicted]) -> list[Variable]:
         error = [one.error[k] for one in methods.values()]
         spread = [one.spread[k] for one in methods.values()]
         found.append(
-            Variable(name, ("method",), values, unit, "per cycle", error, spread)
+            Variable(
+                name, ("method",), values, unit, "displacement per cycle", error, spread
+            )
         )
     distance, error, spread = np.array([one.distance for one in methods.values()]).T
     found.append(
         Variable(
-            "net_distance", ("method",), distance, "BL", "per cycle", error, spread
+            "net_distance",
+            ("method",),
+            distance,
+            "BL",
+            "net distance per cycle",
+            error,
+            spread,
         )
     )
     return found
@@ -244,19 +256,19 @@ def _motion_variables(run: Run) -> list[Variable]:
     """Return the motion in time: pose of the frame, shape, force of the grains,
     work."""
     columns = [
-        ("frame_x", run.pose[:, 0], "m", "of the body frame"),
-        ("frame_y", run.pose[:, 1], "m", "of the body frame"),
-        ("frame_heading", run.pose[:, 2], "rad", "of the body frame"),
+        ("frame_x", run.pose[:, 0], "m", "x of the body frame"),
+        ("frame_y", run.pose[:, 1], "m", "y of the body frame"),
+        ("frame_heading", run.pose[:, 2], "rad", "heading of the body frame"),
     ]
     for k in range(run.alpha.shape[1]):
         columns.append((f"alpha_{k + 1}", run.alpha[:, k], "rad", "joint angle"))
     for k, axis in enumerate("xyz"):
-        label = "of the grains on the body"
+        label = "force of the grains on the body"
         columns.append((f"force_{axis}", run.force[:, k], "N", label))
     columns += [
-        ("moment", run.moment, "N m", "about the centre of mass"),
-        ("work_done", run.work, "J", "of the body on the grains so far"),
-        ("kinetic_energy", run.kinetic, "J", "of the body"),
+        ("moment", run.moment, "N m", "moment about the centre of mass"),
+        ("work_done", run.work, "J", "work of the body on the grains so far"),
+        ("kinetic_energy", run.kinetic, "J", "kinetic energy of the body"),
     ]
     found = [Variable("t", ("t",), run.t, "s", "time")]
     for name, values, unit, label in columns:
@@ -282,9 +294,11 @@ def _outline_variables(
     for k, axis in enumerate("xy"):
         over = ("picture_t", "point")
         found.append(
-            Variable(f"body_{axis}", over, points[..., k], "BL", "of the body")
+            Variable(f"body_{axis}", over, points[..., k], "BL", "position of the body")
         )
-        found.append(Variable(f"track_{axis}", ("t",), track[k], "BL", "of the frame"))
+        found.append(
+            Variable(f"track_{axis}", ("t",), track[k], "BL", "track of the body frame")
+        )
     return found
 
 

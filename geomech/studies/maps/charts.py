@@ -126,7 +126,7 @@ class Chart:
         them."""
         family = self.family
         if family is None:
-            raise Refusal("this chart is that of one scene, and not of a family")
+            raise Refusal("this chart belongs to one scene, not to a family")
         between = 0.0
         if value not in family.values:
             between = family.error * body_size(self.scene.system)
@@ -260,13 +260,13 @@ def refuse(scene: Scene) -> None:
     with located(scene.name):
         if system.joints != 2:
             raise Refusal(
-                f"a chart has two shape variables, this body {system.joints}",
-                instead="see 'geomech displacement'",
+                f"a chart needs two shape variables, this body has {system.joints}",
+                instead="use 'geomech displacement'",
             )
         harmonic.HARMONIC.refuse(system)
         if capability(system, Drawable) is None:
             raise Refusal(
-                "this system has no body to draw", instead="see 'geomech ccf'"
+                "this system has no body to draw", instead="use 'geomech ccf'"
             )
 
 

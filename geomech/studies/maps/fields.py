@@ -51,11 +51,11 @@ A_ALONE = "A"
 STRUCT = "struct"
 
 ERROR_OF_CCF = (
-    "estimated error of ccf: largest difference, at a shape and its neighbours, "
-    "from half the grid's points"
+    "estimated error of ccf: largest difference, at a shape and its neighbours, from "
+    "a grid with half as many points"
 )
-INTERVAL_OF_CCF = "half width of the interval of ccf"
-INTERVAL_OF_A = "half width of the interval of A"
+INTERVAL_OF_CCF = "half width of the confidence interval of ccf"
+INTERVAL_OF_A = "half width of the confidence interval of A"
 
 
 # Results.
@@ -175,10 +175,9 @@ def check_joints(scene: Scene, file: Callable | None) -> None:
     if required in (None, joints):
         return
     raise Refusal(
-        f"a {file.suffix} file has a layout of {required} joints, "
-        f"and this body has {joints}",
+        f"a {file.suffix} file stores {required} joints, but this body has {joints}",
         where=scene.name,
-        instead="write a .nc file, which takes any number of joints",
+        instead="write a .nc file, which stores any number of joints",
     )
 
 
@@ -258,13 +257,15 @@ def conventions(scene: Scene) -> dict:
 def _frame_meaning(frame: str) -> str:
     meanings = {
         "mean": "centre of mass, length-weighted mean heading",
-        UNKNOWN_FRAME: "not told by its file",
+        UNKNOWN_FRAME: "not given in its file",
         "minimum-perturbation": (
-            "the one in which the squares of A, integrated over the grid, are least"
+            "the one that minimises the integral of the squares of A over the grid"
         ),
         "that of the log": "the one whose x, y and heading were logged",
     }
-    return meanings.get(frame, "centre and heading of that link, 1 the tail")
+    return meanings.get(
+        frame, "centre and heading of that link, where link 1 is the tail"
+    )
 
 
 def recorded_attributes(system: System) -> dict:
@@ -330,16 +331,16 @@ def fit_variables(study: SceneTables) -> list[Variable]:
     fitted = study.fitted
     pairs = zip(fitted.residual, fitted.speed)
     shares = [_residual_share(residual, speed) for residual, speed in pairs]
-    label = "rms of what the fit leaves, over the rms of xi"
+    label = "rms residual of the fit over the rms of xi"
     found = [Variable("fit_share", ("component",), shares, "1", label)]
 
     if not study.scene.system.traits.linear and fitted.direction_error is not None:
-        label = "rms of what more directions change A by, over the rms of A"
+        label = "rms change of A with more directions, over the rms of A"
         changes = _row_shares(fitted.direction_error, fitted.A)
         found.append(Variable("direction_share", ("component",), changes, "1", label))
 
     singular = int(np.isnan(fitted.A).any((0, 1)).sum())
-    label = "points of the grid"
+    label = "number of singular grid points"
     found.append(Variable("singular_shapes", (), singular, "1", label))
     return found
 
@@ -369,8 +370,8 @@ def even_part_variables(study: SceneTables) -> list[Variable]:
     dims = ("component", *angle_names(study.fitted.axes))
     units = component_units(length_unit(study.scene.system), "rad")
     label = (
-        "rms over directions of xi(alphadot) + xi(-alphadot), |alphadot| = 1, "
-        "which A takes for 0"
+        "rms over directions of xi(alphadot) + xi(-alphadot), |alphadot| = 1, which A "
+        "assumes to be 0"
     )
     return [Variable("even_part", dims, even_part, units, label)]
 
@@ -405,7 +406,8 @@ def reach_variable(tube: Tube) -> Variable:
     over the distance that the data reach."""
     shapes = np.stack(np.meshgrid(*tube.axes, indexing="ij"), -1)
     label = (
-        "distance from the mean gait over that which the data reach: A is nan beyond 1"
+        "distance from the mean gait over the distance that the data reach; A is "
+        "nan beyond 1"
     )
     return Variable("reach", angle_names(tube.axes), tube.reach(shapes), "1", label)
 
@@ -420,21 +422,21 @@ def taylor_variables(series: TaylorSeries, unit: str) -> list[Variable]:
     fourier = "Fourier coefficients, 1, cos t, sin t, cos 2t ..., of"
     at_phases = "at equally spaced phases"
     slope = (
-        f"{fourier} the derivative of A along normals of the mean gait; "
-        "to its left in the plane of two joints"
+        f"{fourier} the derivative of A along normals of the mean gait; towards its "
+        "left in the plane of two joints"
     )
     errors = (
-        "independent errors of gait_A, and of gait_slope: "
-        "the squares of what each does add up to a variance"
+        "independent errors of gait_A and of gait_slope; their squared contributions "
+        "add up to a variance"
     )
     spread = f"{at_phases}: the data reach deviations d with d . inverse . d up to 1"
     beyond = (
-        "what the variation of the cycles changes in the net pose beyond the first "
+        "change of the net pose by the variation of the cycles beyond the first "
         "order, part of its error"
     )
     standard_error = (
-        f"{at_phases}: standard errors of A along the mean gait, and across it, "
-        "for what is left of xi"
+        f"{at_phases}: standard errors of A along and across the mean gait, from the "
+        "residual of xi"
     )
     return [
         Variable(
@@ -525,7 +527,7 @@ def harmonics_variables(table: Harmonics, unit: str) -> list[Variable]:
         "for alphadot = (cos beta, sin beta)"
     )
     residual = (
-        "rms over directions of alphadot of what the harmonics leave of xi, "
+        "rms residual of xi beyond the harmonics, over directions of alphadot with "
         "|alphadot| = 1"
     )
     return [
@@ -544,7 +546,7 @@ def metric_variables(metric: Metric | Finsler, of_drag: bool = True) -> list[Var
     """Return M, or the coefficients of a norm and their residual. of_drag: the metric
     is the power of drag, not the system's own metric."""
     angles = angle_names(metric.axes)
-    scale = "drag that of the whole body along itself, lengths those of the body"
+    scale = "unit of drag: the axial drag of the whole body; unit of length: the body"
     if isinstance(metric, Metric):
         dims = ("joint", "other_joint", *angles)
         if of_drag:
@@ -553,8 +555,8 @@ def metric_variables(metric: Metric | Finsler, of_drag: bool = True) -> list[Var
         else:
             units = effort.METRIC_UNIT
             label = (
-                "metric M of the system itself: alphadot . M alphadot is what it costs "
-                "to change shape"
+                "metric M of the system itself: alphadot . M alphadot is the cost of "
+                "changing shape"
             )
         return [Variable("metric", dims, metric.M, units, label)]
 
@@ -565,7 +567,7 @@ def metric_variables(metric: Metric | Finsler, of_drag: bool = True) -> list[Var
         f"{scale}"
     )
     residual = (
-        "rms over directions of alphadot of what the coefficients leave of F, "
+        "rms residual of F beyond the coefficients, over directions of alphadot with "
         "|alphadot| = 1"
     )
     return [
@@ -580,15 +582,21 @@ def stretch_variables(stretch: Stretch, unit: str) -> list[Variable]:
     """Return shape space redrawn to equal effort. unit: of path lengths."""
     dims = ("stretched_alpha_1", "stretched_alpha_2")
     shapes = stretch.field
-    stretched = "place of a shape where equal lengths take equal effort"
-    rms = "rms of the relative errors of lengths on paper"
-    folded = "share of cells that are turned over"
+    stretched = "position of a shape on the map where equal lengths take equal effort"
+    rms = "rms relative error of lengths on paper"
+    folded = "share of cells that are folded over"
     return [
         *(Variable(name, (name,), x, "rad") for name, x in zip(dims, shapes.axes)),
         Variable("stretched_shape", ("axis", *dims), shapes.values, unit, stretched),
         Variable("stretch_distortion", dims, stretch.distortion, "1", rms),
-        Variable("stretch_rms", (), stretch.rms, "1", f"{rms}, of all"),
-        Variable("stretch_largest", (), stretch.largest, "1", "largest of them"),
+        Variable("stretch_rms", (), stretch.rms, "1", f"{rms}, over all cells"),
+        Variable(
+            "stretch_largest",
+            (),
+            stretch.largest,
+            "1",
+            "largest relative error of lengths on paper",
+        ),
         Variable("stretch_folded", (), stretch.folded, "1", folded),
         Variable("stretch_interpolation", (), shapes.degree, "1", "degree of splines"),
     ]

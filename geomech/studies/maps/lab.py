@@ -40,7 +40,7 @@ class Lab:
     scenes: tuple[Scene, ...]
     over: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
-    cheaper_alternative: ClassVar[str] = "ask for less"
+    cheaper_alternative: ClassVar[str] = "request less"
     report_above: ClassVar[float] = WORTH_SAYING
 
     @property
@@ -81,7 +81,7 @@ class Lab:
         """Value of the parameter in the scene itself."""
         if len(self.over) != 1:
             raise Refusal(
-                "a family has one parameter",
+                "a family varies exactly one parameter",
                 value=list(self.over),
                 instead="give ``over`` once",
             )
@@ -89,16 +89,16 @@ class Lab:
         section, _, name = key.partition(".")
         if section not in SECTIONS:
             raise Refusal(
-                f"a family varies a key of {', '.join(SECTIONS)}, not {key}",
+                f"a family can vary a key of {', '.join(SECTIONS)}, not {key}",
                 where="``over``",
-                instead="see 'geomech sweep' for others",
+                instead="use 'geomech sweep' for others",
             )
         own = self._grid.tables.get(section, {}).get(name)
         if isinstance(own, bool) or not isinstance(own, (int, float)):
             raise Refusal(
-                f"the scene gives no number for {key}",
+                f"the scene has no number at {key}",
                 where=self.scene.name,
-                instead="name a key of its file",
+                instead="use a key of its file",
             )
         return float(own)
 
@@ -109,8 +109,8 @@ class Lab:
         values = sorted({*given, self._own})
         if len(values) not in N_MEMBERS:
             raise Refusal(
-                f"a family has {N_MEMBERS[0]} to {N_MEMBERS[-1]} members, "
-                "its own value counted",
+                f"a family has {N_MEMBERS[0]} to {N_MEMBERS[-1]} members, including "
+                "the scene's own value",
                 value=len(values),
                 where="``over``",
                 instead="give fewer or more values",

@@ -43,8 +43,8 @@ from rft.core.checks import is_whole, real_array
 from rft.core.refusal import Refusal, located
 
 NO_MAP_MESSAGE = (
-    "a body of one joint has no map, a loop of it encloses no area: give it one joint "
-    "more, or drop the figure"
+    "a body with one joint has no map, because a loop of one joint encloses no area: "
+    "add a joint, or leave the figure out"
 )
 MAX_PAIRS = 10  # of joints in a figure: as many as five joints have
 ROUNDING = 1e-12  # largest size of a component that is nothing but roundoff
@@ -105,7 +105,7 @@ class Plan:
         joints = self.scene.system.joints
         if joints > 2 and self.field:
             return f"lower ``grid``, to {finest_grid(joints)} or less"
-        return "ask for less"
+        return "request less"
 
     @cached_property
     def other(self) -> SceneTables | None:
@@ -149,8 +149,8 @@ class Plan:
         if len(pairs) > MAX_PAIRS:
             raise Refusal(
                 f"{joints} joints have {len(pairs)} pairs",
-                instead=f"say which, such as ``pair`` 1,{joints}, "
-                "or give a chain [body] modes",
+                instead=f"choose one, such as ``pair`` 1,{joints}, or give the chain "
+                "[body] modes",
             )
         return [
             (pair, plane_origin(self.scene, pair, self.held, is_single))
@@ -172,12 +172,12 @@ class Plan:
                     raise Refusal(
                         reason,
                         where=self.scene.name,
-                        instead="drop ``metric`` and ``stretch``",
+                        instead="remove ``metric`` and ``stretch``",
                     )
             if self.other_frame is not None and len(self.pairs_and_origins) > 1:
                 raise Refusal(
                     "``compare_frame`` draws one pair of joints",
-                    instead="say which with ``pair``",
+                    instead="choose one with ``pair``",
                 )
         _ = self.other
 
@@ -310,7 +310,7 @@ def connection_variables(planes: Sequence[Plane]) -> list[Variable]:
         component, *angles = plane_dims(plane)
         dims = (component, "moving_joint", *angles)
         units = fields.component_units(plane.connection.unit, "rad")
-        label = "columns of A of the joints that move"
+        label = "columns of A for the joints that move"
         values = plane.connection.A
         found.append(Variable(f"A{joint_suffix(plane)}", dims, values, units, label))
     return found
@@ -366,7 +366,7 @@ def zero_line(ccf: Field, middle: np.ndarray) -> list[Variable]:
         ("zero_line_nearest", nearest, "rad", f"least distance {place}"),
         ("zero_line_farthest", farthest, "rad", f"largest distance {place}"),
         ("zero_line_share", has_zero_line.mean(), "1", share),
-        ("zero_line_reach", reach, "rad", "distance that was looked at"),
+        ("zero_line_reach", reach, "rad", "largest distance that was searched"),
     )
     return [
         Variable(name, (), value, unit, label) for name, value, unit, label in scalars
@@ -437,8 +437,9 @@ def plane_origin(
     fixed = [k for k in range(scene.system.joints) if k + 1 not in pair]
     if angles is not None and not fixed:
         raise Refusal(
-            "``slice`` says where other joints are held, and this body has but two",
-            instead="drop it",
+            "``slice`` gives the angles of the other joints, and this body has "
+            "only two",
+            instead="leave it out",
         )
     if angles is None:
         return origin
@@ -452,7 +453,7 @@ def plane_origin(
         raise Refusal(
             f"the angles must lie within the field's {extent:g} rad",
             where="``slice``",
-            instead="give others, or raise ``extent``",
+            instead="give smaller angles, or raise ``extent``",
         )
     if len(angles) == len(origin) > 1:
         return np.array(angles)
@@ -463,8 +464,8 @@ def plane_origin(
         if is_single and len(fixed) > 1:
             choices = f"{len(fixed)} one by one, or "
         raise Refusal(
-            f"``slice`` takes one angle for all joints that are held, "
-            f"{choices}{len(origin)} for a shape",
+            f"``slice`` takes one angle for all fixed joints, {choices}{len(origin)} "
+            "for a shape",
             value=len(angles),
         )
     origin[fixed] = angles

@@ -62,13 +62,13 @@ def form_of(measured: str | Path | Log | Trial, options: Mapping[str, Any]) -> s
             f"``{of_logs[0]}`` belongs to {WORDS[LOG]}, and ``{of_midlines[0]}`` to "
             f"{WORDS[MIDLINES]}",
             where=line(file.name),
-            instead="drop one",
+            instead="remove one of them",
         )
     if not form:
         form = MIDLINES if of_midlines else LOG
     wrong = of_logs if form == MIDLINES else of_midlines
     columns = formatted(", ".join(header), 120)
-    because = f"by its header this is a file of {WORDS[form]}: {columns}"
+    because = f"according to its header, this file contains {WORDS[form]}: {columns}"
     refuse(file.name, form, wrong, because)
     return form
 
@@ -79,7 +79,8 @@ def refuse(name: str, form: str, wrong: Sequence[str], because: str = "") -> Non
         return
     if wrong[0] == "scene":
         raise Refusal(
-            f"a scene is that of {WORDS[LOG]}, and this is one of {WORDS[form]}",
+            f"a scene can be written from {WORDS[LOG]}; this file contains "
+            f"{WORDS[form]}",
             where=line(name),
             instead=SCENE,
         )
@@ -88,5 +89,5 @@ def refuse(name: str, form: str, wrong: Sequence[str], because: str = "") -> Non
         f"``{wrong[0]}`` belongs to {WORDS[other]}",
         where=line(name),
         because=because,
-        instead="drop it, or rename the columns",
+        instead="remove it, or rename the columns",
     )

@@ -38,7 +38,7 @@ def period(log: Log) -> float:
     alpha = np.stack([np.interp(t, log.t, a) for a in log.alpha.T], -1)
     repeat = phase.period_of(t, alpha)
     _check_one_period(log, t, alpha, repeat)
-    instead = f"give at least {ENOUGH} cycles of one gait, some dozens are better"
+    instead = f"give at least {ENOUGH} cycles of one gait, preferably some dozens"
     if not repeat:
         raise log.wrong("the joints do not repeat", instead=instead)
     count = (log.t[-1] - log.t[0]) / repeat
@@ -47,12 +47,12 @@ def period(log: Log) -> float:
     if repeat * FASTEST < 1.0:
         raise log.wrong(
             f"the joints repeat every {repeat:.3g} where t is in s",
-            instead="give t in s, or in any longer unit",
+            instead="give t in s, or in another unit longer than ms",
         )
     rows = len(log.t) / count
     if rows < LEAST_ROWS:
         raise log.wrong(
-            f"{rows:.1f} rows a cycle are too few",
+            f"{rows:.1f} rows per cycle are too few",
             instead=f"give at least {LEAST_ROWS}",
         )
     _check_gaps(log, repeat)
@@ -73,8 +73,8 @@ def _check_one_period(
         raise log.wrong(
             f"the joints repeat every {first:.3g} in the first quarter of the log and"
             f" every {last:.3g} in the last",
-            because="two gaits are in it",
-            instead="give each a file",
+            because="it contains two gaits",
+            instead="give each its own file",
         )
 
 
@@ -86,15 +86,15 @@ def _check_gaps(log: Log, repeat: float) -> None:
     if count == 0:
         return
     k = int(gaps.argmax())
-    which = "its one gap"
+    which = "its only gap"
     if count > 1:
         which = f"the longest of {count} gaps"
     raise log.wrong(
-        f"no rows for {gaps[k]:.3g} after this one (t = {log.t[k]:.6g}),"
-        f" {gaps[k] / repeat:.2g} of a cycle, {which}",
+        f"no rows for {gaps[k]:.3g} after this one (t = {log.t[k]:.6g}), "
+        f"{gaps[k] / repeat:.2g} of a cycle, {which}",
         k,
-        instead="cut the log and give the longest part, or fill what is longer than"
-        f" {LARGEST_GAP:g} of a cycle",
+        instead="cut the log and give its longest part, or fill gaps longer than "
+        f"{LARGEST_GAP:g} of a cycle",
     )
 
 
@@ -117,10 +117,10 @@ def check_a_loop(log: Log, joints: Smoothed, rows: float) -> None:
     last = log.joints[-1]
     slope = axes[0, -1] / axes[0, 0]
     raise log.wrong(
-        f"{last} is {slope:.3g} times {first}, but for a constant and noise",
-        because=f"one shape variable recorded {len(log.joints)} times goes to and fro,"
-        " and is no loop",
-        instead="name the columns of joints that move apart, by ``columns``",
+        f"{last} is {slope:.3g} times {first}, apart from a constant and noise",
+        because=f"one shape variable that is recorded {len(log.joints)} times moves "
+        "back and forth and encloses no loop",
+        instead="use ``columns`` to choose joints that move independently",
     )
 
 
@@ -196,10 +196,10 @@ def _check_growing(log: Log, row_phases: np.ndarray, period: float) -> None:
     if slow.size:
         row = inside[slow[0]]
         raise log.wrong(
-            "the gait stands, slips or runs back after this row"
-            f" (t = {log.t[row]:.6g})",
+            "the gait pauses, slips or runs backwards after this row (t = "
+            f"{log.t[row]:.6g})",
             row,
-            instead="cut pauses and starts out, and give each gait a file",
+            instead="cut out pauses and starts, and give each gait its own file",
         )
 
 
@@ -225,9 +225,9 @@ def check_no_drift(log: Log, number: np.ndarray, alpha: np.ndarray) -> None:
         scatter = (means - start - slope * c).std()
         if abs(slope) * c[-1] > max(swing, STEADY_DRIFT * scatter):
             raise log.wrong(
-                f"{name} drifts from {means[0]:.3g} to {means[-1]:.3g} over the log and"
-                f" swings by {swing:.2g} in a cycle",
-                because="what drifts is no part of a gait",
+                f"{name} drifts from {means[0]:.3g} to {means[-1]:.3g} over the log "
+                f"and oscillates by {swing:.2g} within a cycle",
+                because="a drifting variable is not part of a gait",
                 instead="leave it out with ``columns``",
             )
 
@@ -269,7 +269,7 @@ def check_one_gait(
         raise log.wrong(
             "two gaits",
             row,
-            because=f"{k[best]} cycles are of one kind and {count - k[best]} of"
-            f" another, which begins here (t = {log.t[row]:.6g})",
-            instead="give each a file",
+            because=f"{k[best]} cycles are of one kind and {count - k[best]} of "
+            f"another, which begins here (t = {log.t[row]:.6g})",
+            instead="give each its own file",
         )

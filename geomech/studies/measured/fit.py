@@ -199,7 +199,7 @@ def fit_log(
     count = number.max() + 1
     if count < cycles.FEWEST:
         raise log.wrong(
-            f"{count} whole cycles, without the log's ends, are too few",
+            f"{count} full cycles, without the ends of the log, are too few",
             instead=f"give at least {cycles.ENOUGH} in all",
         )
     cycles.check_no_drift(log, number, joints.values)
@@ -324,7 +324,7 @@ def _taylor_series(
         coefficients, errors = regression.solution(equations)
     except np.linalg.LinAlgError:
         raise log.wrong(
-            "its cycles do not settle so many unknowns",
+            "its cycles do not determine so many unknowns",
             instead="lower ``harmonics``, or give more cycles",
         ) from None
 
@@ -336,8 +336,8 @@ def _taylor_series(
     largest = max(np.abs(A).max(), np.abs(errors).max())
     if largest > LARGEST_ENTRY:
         raise log.wrong(
-            f"entries of A come out as large as {largest:.1g}",
-            instead="give x and y in body lengths or m, and joints that move",
+            f"entries of A reach {largest:.1g}",
+            instead="give x and y in body lengths or m, and choose joints that move",
         )
     taylor = TaylorSeries(
         loop=loop,

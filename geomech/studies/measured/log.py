@@ -109,12 +109,12 @@ def read(path: str | Path, columns: Sequence[str] = (), degrees: bool = False) -
             raise Refusal(
                 f"{len(source.rows)} rows, more than {MOST_ROWS}",
                 where=source.name,
-                instead="thin them out",
+                instead="reduce the number of rows",
             )
         log = _read(source, picked, degrees)
     except ValueError as error:
         if "a row must be" in error.what:
-            error.instead = "mend that row, or drop it"
+            error.instead = "correct that row, or remove it"
         raise
     turn = np.ones(len(picked))
     turn[[*range(1, len(picked) - 3), -1]] = _turns(picked, degrees, source.place)
@@ -133,7 +133,7 @@ def _read(source: Rows, picked: tuple[str, ...], degrees: bool) -> Log:
     if note:
         notes.append(note)
     if turns[-1] != turns[0] and not split_unit(picked[-1])[1]:
-        notes.append(f"{picked[-1]} is taken to be in rad")
+        notes.append(f"{picked[-1]} is assumed to be in rad")
     unit, size = _length(picked, source.place)
     rows = source.numbers(header, picked[1:])
     alpha = rows[:, :-3] * turns[:-1]
@@ -166,15 +166,15 @@ def _turns(picked: tuple[str, ...], degrees: bool, place: str) -> np.ndarray:
         unit = split_unit(name)[1]
         if unit not in UNITS["angle"] and unit != "":
             raise Refusal(
-                f"{name} is in {unit} by its name",
+                f"the name of {name} gives the unit {unit}",
                 where=place,
                 instead="give angles in rad, or in degrees",
             )
         if degrees and unit in ("rad", "radians"):
             raise Refusal(
-                f"{name} is in rad by its name",
+                f"the name of {name} gives the unit rad",
                 where=place,
-                instead="drop ``degrees``, or rename the column",
+                instead="remove ``degrees``, or rename the column",
             )
         if unit == "":
             unit = "deg" if degrees else "rad"
@@ -182,9 +182,9 @@ def _turns(picked: tuple[str, ...], degrees: bool, place: str) -> np.ndarray:
     named = [bool(split_unit(name)[1]) for name in picked[1:-3]]
     if any(named) and not all(named):
         raise Refusal(
-            f"{picked[1 + named.index(False)]} has no unit beside joints that have one",
+            f"{picked[1 + named.index(False)]} has no unit, but other joints have one",
             where=place,
-            instead="give all of them their unit, as in alpha_1_deg",
+            instead="give each its unit, as in alpha_1_deg",
         )
     return np.array(turns)
 
@@ -196,15 +196,15 @@ def _length(picked: tuple[str, ...], place: str) -> tuple[str, float]:
     unit = units[0]
     if units[1] != unit:
         raise Refusal(
-            f"{picked[-3]} and {picked[-2]} are in two units",
+            f"{picked[-3]} and {picked[-2]} have different units",
             where=place,
-            instead="give both in one",
+            instead="give both in the same unit",
         )
     if unit in ("", "BL"):
         return unit, 1.0
     if unit not in UNITS["length"]:
         raise Refusal(
-            f"{picked[-3]} is in {unit} by its name",
+            f"the name of {picked[-3]} gives the unit {unit}",
             where=place,
             instead="give x and y in body lengths, or in m with ``body_length``",
         )
@@ -220,9 +220,9 @@ def _pick(
     twice = [c for k, c in enumerate(header) if c in header[:k]]
     if twice:
         raise Refusal(
-            f"the column {formatted(twice[0])} is there twice",
+            f"the column {formatted(twice[0])} appears twice",
             where=where,
-            instead="rename one",
+            instead="rename one of them",
         )
     if columns:
         return _check_columns(name, where, header, columns)
@@ -235,9 +235,9 @@ def _pick(
         candidates = [c for c in header if bare[c] in names]
         if len(candidates) > 1:
             raise Refusal(
-                f"{' and '.join(candidates)} may both be the column {role}",
+                f"both {' and '.join(candidates)} could be the column {role}",
                 where=where,
-                instead="list those to take in ``columns``",
+                instead="list the columns to use in ``columns``",
             )
         if candidates:
             roles[role] = candidates[0]
@@ -247,15 +247,15 @@ def _pick(
     missing = [role for role in POSE if role not in roles]
     if missing or len(joints) < 2:
         few = "one column" if joints else "no columns"
-        what = f"{few} of joint angles, and a gait is a loop of two or more"
+        what = f"{few} of joint angles, but a gait is a loop of two or more"
         if missing:
             what = f"no column {missing[0]}"
         raise Refusal(
             what,
             where=where,
-            because=f"it has {formatted(', '.join(header), 240)}",
-            instead="name them t,alpha_1,alpha_2,x,y,heading, or list those in"
-            " ``columns``",
+            because=f"the columns are {formatted(', '.join(header), 240)}",
+            instead="name them t,alpha_1,alpha_2,x,y,heading, or list the columns in "
+            "``columns``",
         )
     return _check_joints(
         name, [roles["t"], *joints, roles["x"], roles["y"], roles["heading"]]
@@ -272,12 +272,13 @@ def _check_columns(
     if missing:
         existing = formatted(", ".join(header), 200)
         raise Refusal(
-            f"no column {formatted(missing[0])}; it has {existing}", where=where
+            f"no column {formatted(missing[0])}; the columns are {existing}",
+            where=where,
         )
     if len(columns) < 6 or len({*columns}) < len(columns):
         raise Refusal(
-            "``columns`` are those of t, two joint angles or more, x, y and heading, in"
-            " this order",
+            "``columns`` must list t, two or more joint angles, x, y and heading, in "
+            "this order",
             where=name,
         )
     return _check_joints(name, columns)
@@ -303,7 +304,7 @@ def _check_joints(name: str, columns: list[str]) -> tuple[str, ...]:
         raise Refusal(
             f"{len(columns) - 4} joint angles, more than {MOST_JOINTS}",
             where=name,
-            instead="give the shape in a few modes as columns",
+            instead="describe the shape by a few modes, one per column",
         )
     return tuple(columns)
 
@@ -339,7 +340,7 @@ def _check_units(log: Log, picked: Sequence[str], turn: np.ndarray) -> None:
     if turn[-1] == 1.0 and jumps.size:
         k = jumps[0] + 1
         raise log.wrong(
-            f"{picked[-1]} jumps by {step[k - 1]:.4g}, a turn in degrees",
+            f"{picked[-1]} jumps by {step[k - 1]:.4g}, a full turn in degrees",
             k,
             instead="say ``degrees``",
         )
@@ -350,20 +351,20 @@ def _check_units(log: Log, picked: Sequence[str], turn: np.ndarray) -> None:
             raise log.wrong(
                 f"{name} reaches {angle:.4g} where joint angles are in rad",
                 row,
-                instead="say ``degrees`` if these are degrees",
+                instead="add ``degrees`` if these are degrees",
             )
         if abs(angle) > LARGEST_ANGLE:
             raise log.wrong(
                 f"{name} reaches {np.degrees(angle):.4g} degrees",
                 row,
-                because="no joint turns so far",
+                because="no joint turns that far",
             )
     size = np.degrees(np.abs(log.alpha).max())
     are_degrees = (turn[1:-3] != 1.0).all()
     if are_degrees and size < 2 * np.pi:
         warnings.warn(
-            f"{log.name}: joint angles of at most {size:.3g} degrees: drop ``degrees``"
-            " if these are rad",
+            f"{log.name}: joint angles are at most {size:.3g} degrees: remove "
+            "``degrees`` if they are in rad",
             UnitWarning,
             stacklevel=3,
         )
@@ -382,7 +383,7 @@ def _checked(log: Log) -> Log:
     if (np.ptp(pose, axis=0) == 0).all():
         raise log.wrong(
             "x, y and heading do not move",
-            because="nothing was measured of the body's motion",
+            because="no motion of the body was measured",
         )
     return replace(log, alpha=alpha, pose=pose)
 
@@ -403,16 +404,16 @@ def check_rows(log: Log) -> None:
             continue
         if abs(deviation[k]) > abs(v[k + 2] - v[k]):
             raise log.wrong(
-                f"{name} is {deviation[k]:.3g} off the rows before and after",
+                f"{name} differs by {deviation[k]:.3g} from the rows before and after",
                 k + 1,
-                instead="mend that row, or drop it",
+                instead="correct that row, or remove it",
             )
         jump = k + 2
         if abs(v[k + 1] - v[k]) > abs(v[k + 2] - v[k + 1]):
             jump = k + 1
         reason = "the tracking slipped"
         if name in log.joints:
-            reason = "two gaits are in the file, or the tracking slipped"
+            reason = "the file contains two gaits, or the tracking slipped"
         raise log.wrong(
             f"{name} jumps by {v[jump] - v[jump - 1]:.3g} to this row",
             jump,

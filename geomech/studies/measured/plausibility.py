@@ -42,18 +42,18 @@ def note_units(
         )
     if speed > FASTEST_MOTION * joint_speed:
         notes.append(
-            f"x and y move by {speed / joint_speed:.3g} body lengths where the joints"
-            " turn by 1 rad: give them in body lengths, or in m with ``body_length``"
+            f"x and y move by {speed / joint_speed:.3g} body lengths while the joints "
+            "turn by 1 rad: give them in body lengths, or in m with ``body_length``"
         )
     if length is None and log.metres:
         notes.append(
-            "x and y are in m by the names of their columns, and are taken for body"
-            " lengths: say ``body_length``"
+            "the column names give x and y in m, but they are assumed to be in body "
+            "lengths: add ``body_length``"
         )
     if log.seconds and period > LONGEST_CYCLE:
         notes.append(
-            f"the joints repeat every {period:.4g}, and t is taken for s: convert it if"
-            " it is in ms, or counts frames"
+            f"the joints repeat every {period:.4g}, and t is assumed to be in s: "
+            "convert it if it is in ms or counts frames"
         )
     for line in notes:
         warnings.warn(f"{log.name}: {line}", UnitWarning, stacklevel=3)
@@ -89,8 +89,9 @@ def check_right_handed(
     plain, mirrored = (residual**2).sum(0)
     if mirrored < MIRRORED * plain:
         raise log.wrong(
-            f"x, y and heading do not fit each other, {plain / mirrored:.3g} times"
-            " worse than mirrored",
-            instead="give y upwards (in pictures it runs down), x and y in this order,"
-            " and a heading counter-clockwise from x that does not drift",
+            f"x, y and heading do not agree, {plain / mirrored:.3g} times worse than "
+            "if mirrored",
+            instead="give y pointing up (in images it points down), x and y in this "
+            "order, and a heading that is counter-clockwise from x and does "
+            "not drift",
         )

@@ -16,7 +16,7 @@ from geomech.studies.maps import fields
 from geomech.studies.maps.fields import INTERVAL_OF_CCF, angle_names
 from geomech.studies.measured.fit import PRINTED_PHASES, Fitted
 
-ALONG = "fitted along the gait alone"
+ALONG = "fitted only along the gait"
 DOTS = 4000  # rows of the log, at most, whose shapes a picture shows
 
 
@@ -26,14 +26,14 @@ def status(fit: Fitted) -> str:
     if fit.across:
         return "fitted"
     if not fit.combined:
-        return f"{ALONG}: its cycles do not vary enough to tell A across it"
+        return f"{ALONG}: its cycles vary too little to determine A across it"
     combinations = []
     for k, factors in fit.combined.items():
         combinations.append(f"{fit.log.joints[k]} is {_sum(fit, factors)}")
     names = [fit.log.joints[k] for k in fit.combined]
     return (
-        f"{ALONG}: {', '.join(combinations)}, but for constants and noise, which "
-        f"leaves A across it open: leave {', '.join(names)} out of the columns"
+        f"{ALONG}: {', '.join(combinations)}, apart from constants and noise, so that "
+        f"A across it is undetermined: leave {', '.join(names)} out of the columns"
     )
 
 
@@ -79,11 +79,16 @@ def _displacements(fit: Fitted) -> list[Variable]:
     """Return the displacement of a cycle, as logged and of the mean gait."""
     net, error = fit.displacement
     mean, mean_error = fit.mean
-    interval = f"half width of the interval of {fit.taylor.level:.3g} of cases"
+    interval = f"half width of the {100 * fit.taylor.level:.3g} % confidence interval"
     found = []
     for ending, label, values, errors in (
-        ("", "per cycle, mean of the log", mean, mean_error),
-        ("_predicted", "per cycle of the mean gait, by the connection", net, error),
+        ("", "displacement per cycle, mean of the log", mean, mean_error),
+        (
+            "_predicted",
+            "displacement per cycle of the mean gait, from the connection",
+            net,
+            error,
+        ),
     ):
         for name, value, half_width, unit in zip(POSE, values, errors, _units(fit)):
             variable = Variable(
@@ -106,31 +111,34 @@ def _quality(fit: Fitted) -> list[Variable]:
         Variable("frequency", (), fit.frequency, of_time, "cycles per unit of t"),
         Variable(
             "phase_residual", (), fit.irregular, "rad",
-            "rms of the phase about a uniform run through each cycle",
+            "rms deviation of the phase from uniform progress through each cycle",
         ),
         Variable(
-            "harmonics", (), fit.taylor.A.shape[-1] // 2, "1", "of A in the phase"
+            "harmonics", (), fit.taylor.A.shape[-1] // 2, "1", "harmonics of A in phase"
         ),
         Variable(
             "difference", over, difference, _units(fit),
-            "rms of the difference of cycles as logged and as predicted",
+            "rms difference between logged and predicted cycles",
         ),
         Variable(
             "scatter", over, fit.measured.std(0), _units(fit),
             "standard deviation of the logged cycles",
         ),
-        Variable("explained", over, fit.explained, "1", "share of the squares of xi"),
+        Variable(
+            "explained", over, fit.explained, "1",
+            "explained share of the squares of xi",
+        ),
         Variable(
             "residual", over, fit.residual, rates,
-            "rms misfit of xi over that of the joint rates",
+            "rms residual of xi over the rms of the joint rates",
         ),
         Variable(
             "misfit", over, fit.misfit, rates,
-            "rms over the phase of the error of A along the gait by what the fit "
-            "leaves",
+            "rms over the phase of the error of A along the gait, from the residual "
+            "of the fit",
         ),
         Variable("recorded", ("recorded",), np.array(recorded)),
-        Variable("noise", ("recorded",), fit.noise, noise_units, "of a row"),
+        Variable("noise", ("recorded",), fit.noise, noise_units, "noise of a row"),
     ]  # fmt: skip
 
 
@@ -140,15 +148,16 @@ def _along(fit: Fitted) -> list[Variable]:
     A, error = (np.moveaxis(x, 0, -1) for x in fit.along(t))
     rates = fields.component_units(fit.unit, "rad")
     return [
-        Variable("phase", ("phase",), t, "rad", "of the mean gait"),
+        Variable("phase", ("phase",), t, "rad", "phase of the mean gait"),
         Variable(
             "A_along", ("component", "joint", "phase"), A, rates,
             "A along the mean gait", error,
-            error_label="half width of the interval of A",
+            error_label="half width of the confidence interval of A",
         ),
         Variable(
             "reach_along", ("phase",), _reach(fit), "rad",
-            "half width of the data across the gait, where it is least",
+            "half width of the data across the gait, in the direction in which it "
+            "is smallest",
         ),
     ]  # fmt: skip
 
@@ -164,18 +173,22 @@ def _reach(fit: Fitted) -> np.ndarray:
 def _cycles(fit: Fitted) -> list[Variable]:
     """Return the displacement of each cycle, and shapes of rows of the log."""
     of_time = "s" if fit.log.seconds else "unit of t"
-    starts = "when a cycle begins"
+    starts = "start of a cycle"
     found = [Variable("cycle_start", ("cycle",), fit.times[:-1], of_time, starts)]
     for ending, values, label in (
-        ("", fit.measured, "as logged"),
-        ("_predicted", fit.predicted, "by the connection along its own shapes"),
+        ("", fit.measured, "displacement as logged"),
+        (
+            "_predicted",
+            fit.predicted,
+            "displacement predicted by the connection for its own shapes",
+        ),
     ):
         for k, (name, unit) in enumerate(zip(POSE, _units(fit))):
             name = f"{name}_per_cycle{ending}"
             found.append(Variable(name, ("cycle",), values[:, k], unit, label))
     shapes = fit.samples.alpha
     shapes = shapes[:: max(1, len(shapes) // DOTS)]
-    label = "shapes of rows of the log, smoothed"
+    label = "smoothed shapes of rows of the log"
     return [*found, Variable("shapes", ("row", "joint"), shapes, "rad", label)]
 
 

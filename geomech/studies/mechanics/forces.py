@@ -100,18 +100,18 @@ def unit_words(unit: ForceUnit) -> str:
     """Return what the unit of force is."""
     if unit.drag is None:
         sizes = ", ".join(unit.missing)
-        return f"drag of the straight body along itself; give {sizes} for newtons"
+        return f"drag of the straight body along itself; add {sizes} to obtain newtons"
     words = f"drag of the straight body along itself {unit.drag:.4g} N, {unit.source}"
     if unit.frequency:
         return words
-    return f"{words}; give frequency for watts"
+    return f"{words}; add frequency to obtain watts"
 
 
 def travel_variables(cycle: Cycle) -> list[Variable]:
     """Return the net distance of a cycle and its direction."""
     unit = length_unit(cycle.scene.system)
     distance = np.hypot(*cycle.net[:2])
-    label = "of travel at mid-cycle, from the frame's heading at phase 0"
+    label = "direction of travel at mid-cycle, from the heading of the frame at phase 0"
     return [
         Variable("net_distance", (), distance, unit, "net distance per cycle"),
         Variable("direction", (), cycle.direction, "rad", label),
@@ -151,9 +151,9 @@ def power_variables(found: Result) -> list[Variable]:
     at_joints = joint_power.values.mean()
     unit = power.unit
     return [
-        Variable("mean_power", (), mean, unit, "into the medium", error),
-        Variable("largest_power", (), largest, unit, "into the medium"),
-        Variable("mean_joint_power", (), at_joints, unit, "of the joints"),
+        Variable("mean_power", (), mean, unit, "mean power into the medium", error),
+        Variable("largest_power", (), largest, unit, "largest power into the medium"),
+        Variable("mean_joint_power", (), at_joints, unit, "mean power of the joints"),
     ]
 
 
@@ -179,7 +179,7 @@ def activation_lags(found: Result) -> list[Variable]:
     if joints.size > len(PLACES):
         places = np.array(PLACES)
     lags = np.interp(places, joints, found["fundamental_lag"].values)
-    label = "phase by which activation is ahead of curvature"
+    label = "phase by which activation leads curvature"
     return [
         Variable("place", ("place",), places, "BL", PLACE),
         Variable("lag_of_activation", ("place",), lags, "rad", label),
@@ -434,14 +434,17 @@ def _maps(forward: dict, work: Any, length: np.ndarray) -> list[Variable]:
     power = work.element_power
     return [
         density("forward", normal + tangential, "force in the direction of travel"),
-        density("forward_normal", normal, "its part by forces across the body"),
-        density("forward_tangential", tangential, "its part by forces along the body"),
+        density("forward_normal", normal, "contribution of forces across the body"),
+        density(
+            "forward_tangential", tangential,
+            "contribution of forces along the body",
+        ),
         density("normal", across, "force across the body, to its left"),
         density("tangential", along, "force along the body, to its head"),
         density("power", power, "work against the medium", "drag/rad"),
         Variable(
             "bending_moment", ("phase", "point"), work.bending_moment, "drag x BL",
-            "positive where the left side works",
+            "bending moment, positive where the left side works",
         ),
     ]  # fmt: skip
 
@@ -484,18 +487,20 @@ def _place_variables(forward: dict, length: np.ndarray) -> list[Variable]:
 
 def _joint_variables(activation: dict[str, Any]) -> list[Variable]:
     """Return bends and activation at the joints."""
-    ahead = "phase by which activation is ahead of curvature"
+    ahead = "phase by which activation leads curvature"
     labels = {
-        "lag": f"{ahead}, by changes of sign",
-        "fundamental_lag": f"{ahead}, by the first harmonic",
-        "onset": "phase at which the right side begins to work",
-        "offset": "phase at which the right side ends to work",
+        "lag": f"{ahead}, from changes of sign",
+        "fundamental_lag": f"{ahead}, from the first harmonic",
+        "onset": "phase at which the right side starts to work",
+        "offset": "phase at which the right side stops working",
     }
     bend = activation["bend"]
-    found = [Variable("bend", ("phase", "joint"), bend, "rad", "positive to the left")]
+    found = [
+        Variable("bend", ("phase", "joint"), bend, "rad", "bend, positive to the left")
+    ]
     for name, label in labels.items():
         found.append(Variable(name, ("joint",), activation[name], "rad", label))
-    label = "speed of the wave of activation over that of curvature"
+    label = "speed of the wave of activation over the speed of the wave of curvature"
     for name in ("speed_ratio", "fundamental_speed_ratio"):
         found.append(Variable(name, (), activation[name], "1", label))
     return found

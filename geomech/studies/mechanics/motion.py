@@ -122,12 +122,14 @@ def variables(motion: Motion) -> list[Variable]:
     scene = motion.scene
     system = scene.system
     unit = length_unit(system)
-    phase = Variable("phase", OVER, motion.phase, "rad", "of the gait, 2 pi a cycle")
+    phase = Variable(
+        "phase", OVER, motion.phase, "rad", "phase of the gait, 2 pi per cycle"
+    )
     found = [*final_pose(motion), phase]
     if motion.time is not None:
-        found.append(Variable("time", OVER, motion.time, "s", "from phase 0"))
+        found.append(Variable("time", OVER, motion.time, "s", "time since phase 0"))
 
-    label = f"of the frame {scene.frame}, seen from where it is at phase 0"
+    label = f"pose of the frame {scene.frame}, relative to its pose at phase 0"
     for name, values, pose_unit in zip(POSE, motion.pose.T, (unit, unit, "rad")):
         found.append(Variable(name, OVER, values, pose_unit, label))
 
@@ -190,7 +192,7 @@ def compute_motion(scene: Scene, cycles: int = 1) -> Motion:
     Where cycles are run until they repeat, the limit cycle is returned; where the place
     of the body matters, each cycle continues the one before."""
     if not isinstance(scene, Scene):
-        raise Refusal("a motion is that of a Scene", value=scene)
+        raise Refusal("a motion needs a Scene", value=scene)
     refuse_cycles(cycles)
     gait = scene.gait
     phases = scene.numerics.phases

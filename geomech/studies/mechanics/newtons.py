@@ -96,7 +96,7 @@ def force_unit(scene: Scene, system: Loaded, sizes: Sizes) -> ForceUnit:
 
     drag = _effect_value(scene, "drag")
     if drag is not None and length is not None:
-        source = "as the effect body-inertia has it"
+        source = "as given in the effect body-inertia"
         return ForceUnit(float(drag), length, frequency, source)
 
     missing = [name for name in ("length", "radius") if known[name] is None]
@@ -123,7 +123,7 @@ def _known_sizes(scene: Scene, sizes: Sizes) -> dict[str, float | None]:
         if given is not None and not math.isclose(given, value, rel_tol=1e-6):
             raise Refusal(
                 f"``{name}`` is {given:g}, but the scene has {value:g}",
-                instead=f"drop ``{name}``",
+                instead=f"remove ``{name}``",
             )
         known[name] = value
     return known

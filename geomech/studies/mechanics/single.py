@@ -29,12 +29,14 @@ def velocity(system: System, alpha, alphadot) -> list[Variable]:
             (unit, unit, "rad"),
             "body velocity per unit of time",
         ),
-        Variable("status", (), solution["status"], label="of the balance of forces"),
-        Variable("residual", (), residual, "1", "of the balance of forces"),
+        Variable("status", (), solution["status"], label="status of the force balance"),
+        Variable("residual", (), residual, "1", "residual of the force balance"),
     ]
     if "iterations" in solution:
         steps = solution["iterations"]
-        variables.append(Variable("iterations", (), steps, "1", "of the solver"))
+        variables.append(
+            Variable("iterations", (), steps, "1", "iterations of the solver")
+        )
     return variables
 
 

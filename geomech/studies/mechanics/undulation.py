@@ -185,9 +185,7 @@ def loaded(scene: Any, subject: str) -> Loaded:
         body = capability(system, Loaded)
     if body is None:
         given = scene if system is None else system
-        raise Refusal(
-            f"{subject} is that of a body in a medium, got a {kind_of(given)}"
-        )
+        raise Refusal(f"{subject} needs a body in a medium, got a {kind_of(given)}")
     return body
 
 
@@ -329,7 +327,7 @@ def refined(scene: Scene, finer: int) -> Scene:
     if not isinstance(gait, Sine):
         kind = type(gait).__name__.lower()
         raise Refusal(
-            f"refined is that of a sine wave, got a {kind}",
+            f"refined needs a sine wave, got a {kind}",
             instead="give a scene with a sine wave",
         )
     elements = finer * gait.elements
@@ -386,7 +384,7 @@ def activation_of_bends(
     bend = bent.bend
     if not bend.any() or not np.ptp(bend, axis=0).any():
         raise Refusal(
-            "activation takes a wave of amplitude > 0",
+            "activation needs a wave of amplitude > 0",
             because="a body at rest needs no muscles",
         )
 

@@ -68,7 +68,7 @@ class Phases:
         self.count += 1
         xi = self._velocities(*samples)
         if not np.isfinite(xi).all():
-            raise RuntimeError("a loop that has no velocity somewhere")
+            raise RuntimeError("a loop whose velocity is undefined somewhere")
 
         # Slopes by shape and rate at every phase, (2 d, N, 3), then by the chain rule.
         dxi = (xi[1 : 2 * d + 1] - xi[2 * d + 1 :]) / spans[..., None]

@@ -53,8 +53,8 @@ def checked_limits(scene: Scene, limits: LimitsArgument, phases: int) -> Limits:
         if is_number(limits):
             text = f"{limits:g}"
         raise Refusal(
-            f"``limits`` {text} lies outside the field that the scene has",
-            instead=f"{field}; keep to it",
+            f"``limits`` {text} lies outside the field of the scene",
+            instead=f"{field}; stay within it",
         )
     return _simplified(np.maximum(lowest, low), np.minimum(highest, high))
 
@@ -83,8 +83,8 @@ def _pairs(limits, joints: int) -> np.ndarray:
         or not (pairs[:, 1] - pairs[:, 0] >= LEAST_RANGE).all()
     ):
         raise Refusal(
-            f"``limits`` takes a number, one for each of {joints} joints, or as many"
-            " from low to high",
+            f"``limits`` takes one number, one for each of {joints} joints, or as "
+            "many ranges from low to high",
             value=limits,
         )
     return pairs

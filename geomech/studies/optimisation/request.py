@@ -138,14 +138,15 @@ class Request:
             if objective.timed:
                 instead = "say ``rate``"
             raise Refusal(
-                f"``objective`` {objective.name} asks for power,"
-                f" which {source_name(system)} does not tell",
+                f"``objective`` {objective.name} needs the power, which "
+                f"{source_name(system)} does not give",
                 instead=instead,
             )
         if capability(system, OwnMetric) is not None:
             if objective.power is not None:
                 raise Refusal(
-                    f"``power`` is that of drag, and the {kind_of(system)} has none",
+                    f"``power`` is the power of drag, and the {kind_of(system)} "
+                    "has none",
                     instead="say ``rate``",
                 )
             return 2.0
@@ -167,8 +168,8 @@ class Request:
         degrees = np.log2(fast / slow)
         if np.ptp(degrees) > DEGREE_SCATTER:
             raise Refusal(
-                f"no path has a length with {listed(system, ALL)}",
-                because="its power is of no one degree in the rate",
+                f"paths have no length with {listed(system, ALL)}",
+                because="its power is not proportional to one power of the rate",
                 instead="optimize for displacement",
             )
         return float(np.round(degrees.mean(), 3))
@@ -285,9 +286,9 @@ def build_request(
         system = scene.system
         if near_gait(system):
             raise Refusal(
-                "no gait but one to search",
-                because=f"A is known near {near_gait(system)} alone",
-                instead="measure more varied cycles",
+                "there is only one gait to search",
+                because=f"A is known only near {near_gait(system)}",
+                instead="measure cycles that vary more",
             )
         maximised = _objective(scene, objective, direction, rate, power)
         loops = _loops(scene, harmonics, limits)
@@ -340,17 +341,17 @@ def _check_undulations(objective: Objective, system: System) -> None:
     if not objective.straight:
         raise Refusal(
             "a sine along a straight axis does not turn",
-            because="``objective`` turning takes a gait of few joints",
+            because="``objective`` turning needs a gait with few joints",
         )
     if objective.direction == "y" and system.traits.mirror:
         raise Refusal(
-            "a sine along a straight axis brings nothing across it",
-            instead="drop ``direction``, or say x",
+            "a sine along a straight axis does not move across it",
+            instead="remove ``direction``, or use x",
         )
     if objective.rate is not None:
         raise Refusal(
-            "a wave is as fast as its power allows",
-            instead="say ``power``, a limit of rate is that of joints",
+            "the speed of a wave is limited by its power",
+            instead="use ``power``; a limit of rate applies to joints",
         )
 
 
@@ -360,17 +361,17 @@ def _check_motion(request: Request) -> None:
     objective = request.objective
     if objective.straight and _stays(system):
         raise Refusal(
-            f"the {kind_of(system)} goes nowhere",
+            f"the {kind_of(system)} does not move",
             because="its mean frame stays where it is",
             instead="optimize for turning",
         )
     if objective.name == "turning" and _never_turns(request):
         whose = f"the {kind_of(system)}'s"
         if stored_table(system, "connection"):
-            whose = f"{source_name(system)} tells a body whose"
+            whose = f"{source_name(system)} describes a body whose"
         raise Refusal(
             "no gait turns it",
-            because=f"{whose} heading follows from its shape and comes back with it",
+            because=f"{whose} heading follows from its shape and returns with it",
             instead="optimize for displacement",
         )
 
@@ -460,15 +461,15 @@ def _loops(
         for name, value in (("harmonics", harmonics), ("limits", limits)):
             if value is not None:
                 raise Refusal(
-                    f"``{name}`` is that of joints",
-                    because="of a sine, amplitude and waves are sought",
-                    instead="drop it",
+                    f"``{name}`` applies to joints",
+                    because="the search varies only amplitude and waves of a sine",
+                    instead="remove it",
                 )
         return Undulations(gait, max(64, min(scene.numerics.phases, PHASES)))
     if joints > MAX_JOINTS:
         raise Refusal(
-            f"a loop of {joints} joints is too much to search",
-            because=f"at most {MAX_JOINTS}, or a sine gait",
+            f"a search over a loop of {joints} joints is too large",
+            because=f"use at most {MAX_JOINTS} joints, or a sine gait",
         )
     if harmonics is None:
         harmonics = HARMONICS

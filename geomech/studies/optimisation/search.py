@@ -477,8 +477,8 @@ class _Search:
         if np.ndim(request.loops.within) == 0:
             limit = f"{request.loops.within:g} rad"
         note(
-            f"{request.scene.name}: its gait reaches beyond {limit}:"
-            " the search starts from a smaller one"
+            f"{request.scene.name}: its gait exceeds {limit}: the search starts from "
+            "a smaller one"
         )
         return request.loops.gait(self.constraints.first)
 
@@ -522,8 +522,8 @@ class _Search:
         if self.request.objective.timed and evaluation.time:
             if 0 < evaluation.time < 1 / (2 * np.pi * FASTEST):
                 raise Refusal(
-                    f"its limits let a gait repeat more than {FASTEST:g}"
-                    " times a second",
+                    f"its limits let a gait repeat more than {FASTEST:g} times per "
+                    "second",
                     instead="lower ``rate``, or ``power``",
                 )
             frequency = 1 / (2 * np.pi * evaluation.time)

@@ -21,7 +21,7 @@ from geomech.studies.optimisation.optimum import Optimum
 from rft.core.refusal import Refusal
 
 # How far local optima were searched.
-HOW = ("refined", "by a table alone")
+HOW = ("refined", "from a table only")
 
 
 def attributes(optimum: Optimum) -> dict[str, Any]:
@@ -54,8 +54,10 @@ def variables(optimum: Optimum) -> list[Variable]:
         *displacement(optimum),
         *answers(optimum),
         *limits(optimum),
-        Variable("evaluations", (), optimum.evaluations, "1", "cycles evaluated"),
-        Variable("seconds", (), optimum.seconds, "s", "of computing"),
+        Variable(
+            "evaluations", (), optimum.evaluations, "1", "number of cycles evaluated"
+        ),
+        Variable("seconds", (), optimum.seconds, "s", "computing time"),
     ]
 
 
@@ -99,7 +101,9 @@ def displacement(optimum: Optimum) -> list[Variable]:
             found.append(Variable(name, (), value, unit, "per cycle"))
     if optimum.request.objective.timed:
         frequency = optimum.gait.frequency
-        found.append(Variable("frequency", (), frequency, "Hz", "of the best gait"))
+        found.append(
+            Variable("frequency", (), frequency, "Hz", "frequency of the best gait")
+        )
     return found
 
 
@@ -117,8 +121,8 @@ def answers(optimum: Optimum) -> list[Variable]:
     return [
         Variable("answer", dims, numbers, "", "local optima, best first"),
         Variable("answer_value", dims, values, unit, "value of a local optimum"),
-        Variable("answer_starts", dims, starts, "1", "starts that led there"),
-        Variable("answer_how", dims, [*how], "", "how far it was searched"),
+        Variable("answer_starts", dims, starts, "1", "number of starts that led there"),
+        Variable("answer_how", dims, [*how], "", "how closely it was searched"),
     ]
 
 
@@ -142,7 +146,9 @@ def loop(optimum: Optimum) -> list[Variable]:
         Variable("joint", ("joint",), joints),
         Variable("loop", dims, best, "rad", "best gait"),
         Variable("start_loop", dims, start, "rad", "the scene's gait"),
-        Variable("limited_by", ("phase",), limiting(optimum), "", "limit there"),
+        Variable(
+            "limited_by", ("phase",), limiting(optimum), "", "limit reached there"
+        ),
     ]
     box = getattr(optimum.request.loops, "box", None)
     if box is not None and np.isfinite(box).all():
@@ -177,10 +183,10 @@ def check_stretch(scene: Scene) -> None:
     joints = scene.system.joints
     if joints != 2:
         raise Refusal(
-            f"``stretch`` takes two joints, this one has {joints}",
+            f"``stretch`` needs two joints, this body has {joints}",
             where=scene.name,
-            instead="drop it",
+            instead="remove it",
         )
     reason = why_no_metric(scene.system)
     if reason:
-        raise Refusal(reason, where=scene.name, instead="drop ``stretch``")
+        raise Refusal(reason, where=scene.name, instead="remove ``stretch``")

@@ -126,31 +126,36 @@ def _parameter_variables(f: Fit) -> list[Variable]:
             "value", over, _with_degrees(f, f.values), units, "fitted",
             _with_degrees(f, half_width), error_label=INTERVAL,
         ),
-        Variable("standard_error", over, _with_degrees(f, f.errors), units, "of value"),
+        Variable(
+            "standard_error", over, _with_degrees(f, f.errors), units,
+            "standard error of the value",
+        ),
         Variable(
             "covariance", (*over, "other_parameter"), f.covariance, "",
-            "of the parameters, gamma0 in rad",
+            "covariance of the parameters, gamma0 in rad",
         ),
     ]  # fmt: skip
 
 
 def _rod_variables(f: Fit) -> list[Variable]:
     """Return forces on the whole rod, residuals and sizes, as far as they are known."""
-    found = [Variable("axial_force", (), f.axial_force, "N", "on the whole rod")]
+    found = [
+        Variable("axial_force", (), f.axial_force, "N", "axial force on the whole rod")
+    ]
     if f.axial_stress is not None:
-        label = "over the projected area"
+        label = "axial force over the projected area"
         found.append(Variable("axial_stress", (), f.axial_stress, "Pa", label))
-    found.append(Variable("rms", (), f.rms, "N", "of the residuals"))
+    found.append(Variable("rms", (), f.rms, "N", "rms of the residuals"))
     repeated = repeats(f.data.psi, f.data.forces)
     if repeated is not None:
-        label = "of forces about their means at equal angles"
+        label = "rms of forces about their means at equal angles"
         found.append(Variable("repeats_rms", (), repeated, "N", label))
     label = "e of both ends together, 0 if they are left out"
     found.append(Variable("end_caps", (), f.end_caps, "1", label))
     for name, unit in SIZES.items():
         size = getattr(f.rod, name)
         if size is not None:
-            label = "of the bed" if name == "density" else "of the rod"
+            label = "density of the bed" if name == "density" else "size of the rod"
             found.append(Variable(f"rod_{name}", (), size, unit, label))
     return found
 
@@ -165,7 +170,7 @@ def _row_variables(f: Fit, psi: np.ndarray) -> list[Variable]:
         Variable("psi", ("row",), psi, "degrees", "attack angle"),
         Variable("folded_psi", ("row",), np.degrees(f.data.psi), "degrees", folded),
         Variable("force", over, f.data.forces, "N", "measured"),
-        Variable("fitted", over, fitted, "N", "by the law"),
+        Variable("fitted", over, fitted, "N", "force by the law"),
         Variable("residual", over, f.residuals, "N", "force minus law"),
     ]
 
@@ -175,8 +180,9 @@ def _curve_variables(f: Fit) -> list[Variable]:
     return [
         Variable("angle", ("angle",), np.degrees(CURVE), "degrees", "attack angle"),
         Variable(
-            "law_curve", ("component", "angle"), f.forces(CURVE), "N", "by the law",
-            f.band(CURVE), error_label="half width of the band with 95 %",
+            "law_curve", ("component", "angle"), f.forces(CURVE), "N",
+            "force by the law",
+            f.band(CURVE), error_label="half width of the 95 % confidence band",
         ),
     ]  # fmt: skip
 

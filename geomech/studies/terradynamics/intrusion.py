@@ -25,8 +25,8 @@ UNITS = {  # by the first part of names
     "moment": "N m",
 }
 LABELS = {
-    "force": "on the body, with the weight of effects that have one",
-    "moment": "on the body, about the frame's origin",
+    "force": "force on the body, including the weight for effects that have one",
+    "moment": "moment on the body about the origin of its frame",
 }
 TOLERANCES = 10.0 ** -np.arange(1, 7)  # over the largest force and moment
 # Factor on the extrapolation by order: covers the error of 95 of 100 motions of
@@ -57,8 +57,8 @@ def answer(scene: Intruding) -> Result:
         variables.append(Variable(name, ("t",), values, unit, label, bound))
     mean_power = (run.power[1:] + run.power[:-1]) / 2
     work = float(np.sum(mean_power * np.diff(run.t)))
-    largest = "largest error along the motion, nan where it is not known"
-    finest = f"number of {scene.parts} from which the errors come"
+    largest = "largest error along the motion, nan where it is unknown"
+    finest = f"number of {scene.parts} from which the errors are estimated"
     grains = "of the grains on the body"
     variables += [
         Variable("power", ("t",), run.power, "W", grains),
@@ -138,8 +138,8 @@ class Settings:
     about: ClassVar[str] = "force and moment"
     unit: ClassVar[str] = "1"
     measures: ClassVar[dict[str, str]] = {
-        "force_error": "rms over the motion, over the largest force",
-        "moment_error": "rms over the motion, over the largest moment",
+        "force_error": "rms error over the motion, relative to the largest force",
+        "moment_error": "rms error over the motion, relative to the largest moment",
     }
 
     def check(self) -> None: ...
@@ -215,7 +215,7 @@ class Elements(Cost):
     def __str__(self) -> str:
         seconds = max(1.0, self.seconds)
         parts = f"{self.balances:,} {self.parts}"
-        return f"{parts} at a pose, about {seconds:.0f} s of computing"
+        return f"{parts} at one pose, about {seconds:.0f} s of computing"
 
 
 class Triangles(Elements):

@@ -46,8 +46,8 @@ def answer(
     variables = []
     if beta is not None:
         variables += angle_variables(law, beta, gamma)
-    pulling = "share of angles in which it pulls on the leading face"
-    pushing = "share of angles in which it drives motion on"
+    pulling = "share of angles at which it pulls on the leading face"
+    pushing = "share of angles at which it drives the motion"
     variables.append(Variable("pulling", (), overview.pulling, "1", pulling))
     variables.append(Variable("pushing", (), overview.pushing, "1", pushing))
     if overview.pushing:

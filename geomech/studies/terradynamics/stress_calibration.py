@@ -35,7 +35,7 @@ KEYS = tuple(name.replace("m", "-") for name in COEFFICIENTS)
 NOTED_ERRORS = 3.0
 NOTED_SHARE = 0.02
 UNIT = "N/cm^3"
-INTERVAL = "half width of the interval with 95 %"
+INTERVAL = "half width of the 95 % confidence interval"
 EXPECTED_FILE = "give a CSV file with columns depth_m,force_N"
 
 
@@ -64,8 +64,8 @@ def plate_drags(
     }
     over = ("parameter",)
     rows = ("component", "row")
-    pulling = "share of angles in which the map pulls"
-    pushing = "share of angles in which it drives motion on"
+    pulling = "share of angles at which the map pulls"
+    pushing = "share of angles at which the map drives the motion"
     stress = np.array(alpha)
     half_width = student_factor(f.free) * f.errors
     missing = [int(key in undetermined) for key in KEYS]
@@ -77,24 +77,28 @@ def plate_drags(
         Variable("generic", over, f.zeta * GENERIC, UNIT, "generic set times zeta"),
         Variable(
             "share_from_data", over, f.resolution, "1",
-            "of each value; the rest comes from the shape of the generic set",
+            "share of each value that the data determine; the rest comes from the "
+            "shape of the generic set",
         ),
-        Variable("undetermined", over, missing, "1", "1 if the data do not settle it"),
-        Variable("standard_error", over, f.errors, UNIT, "of value"),
+        Variable(
+            "undetermined", over, missing, "1",
+            "1 if the data do not determine it",
+        ),
+        Variable("standard_error", over, f.errors, UNIT, "standard error of the value"),
         Variable(
             "covariance", (*over, "other_parameter"), f.covariance, f"({UNIT})^2",
-            "of the parameters",
+            "covariance of the parameters",
         ),
-        Variable("zeta", (), f.zeta, "1", "of the generic set that comes nearest"),
-        Variable("rms", (), rms, UNIT, "of the residuals"),
+        Variable("zeta", (), f.zeta, "1", "zeta of the closest generic set"),
+        Variable("rms", (), rms, UNIT, "rms of the residuals"),
         Variable("pulling", (), overview.pulling, "1", pulling),
         Variable("pushing", (), overview.pushing, "1", pushing),
         Variable("component", ("component",), ["alpha_x", "alpha_z"]),
         Variable("beta", ("row",), beta, "degrees", "tilt"),
         Variable("gamma", ("row",), gamma, "degrees", "direction of motion"),
-        Variable("stress", rows, stress, UNIT, "measured, per depth"),
-        Variable("fitted", rows, stress - f.residuals, UNIT, "by the map"),
-        Variable("residual", rows, f.residuals, UNIT, "stress minus map"),
+        Variable("stress", rows, stress, UNIT, "measured stress per depth"),
+        Variable("fitted", rows, stress - f.residuals, UNIT, "stress by the map"),
+        Variable("residual", rows, f.residuals, UNIT, "measured stress minus map"),
         *note_variables(notes),
     ]  # fmt: skip
     return Result("fit_medium", tuple(variables), facts)
@@ -134,10 +138,9 @@ def _undetermined_notes(name: str, f: StressFit, undetermined: list[str]) -> lis
         return []
     beta, gamma = (round(np.degrees(x)) for x in f.least_known())
     return [
-        f"{name}: these drags do not determine {', '.join(undetermined)}: "
-        "what they lack is taken from the shape of the generic set; "
-        "drag plates at other angles, least is known at "
-        f"beta = {beta}, gamma = {gamma} degrees"
+        f"{name}: these drags do not determine {', '.join(undetermined)}: they are "
+        "taken from the shape of the generic set; drag plates at other angles, above "
+        f"all near beta = {beta}, gamma = {gamma} degrees"
     ]
 
 
@@ -179,24 +182,30 @@ def penetration_test(
             "value", ("parameter",), [f.zeta], "1", "fitted", [half_width],
             error_label=INTERVAL,
         ),
-        Variable("standard_error", ("parameter",), [f.error], "1", "of value"),
+        Variable(
+            "standard_error", ("parameter",), [f.error], "1",
+            "standard error of the value",
+        ),
         Variable(
             "covariance", ("parameter", "other_parameter"), [[f.error**2]], "1",
-            "of the parameters",
+            "covariance of the parameters",
         ),
         Variable("downward_stress", (), f.zeta, UNIT, label),
-        Variable("rms", (), rms, "N", "of the residuals"),
-        Variable("area", ("plate",), area, "m^2", "of the plate"),
+        Variable("rms", (), rms, "N", "rms of the residuals"),
+        Variable("area", ("plate",), area, "m^2", "area of the plate"),
         Variable("depth", ("row",), f.depth, "m"),
         Variable("force", ("row",), f.force, "N", "measured"),
         Variable(
-            "fitted", ("row",), f.law, "N", "by zeta", band, error_label=INTERVAL
+            "fitted", ("row",), f.law, "N", "force by zeta", band, error_label=INTERVAL
         ),
-        Variable("residual", ("row",), f.force - f.law, "N", "force minus law"),
+        Variable(
+            "residual", ("row",), f.force - f.law, "N",
+            "measured force minus law",
+        ),
         *note_variables(_zero_depth_notes(test.name, f)),
     ]  # fmt: skip
     if np.isfinite(f.zero):
-        label = "where a straight line through the forces is zero"
+        label = "depth at which a straight line through the forces is zero"
         zero = Variable("zero_depth", (), f.zero, "m", label, f.zero_error)
         variables.append(replace(zero, error_label="standard error"))
     return Result("fit_medium", tuple(variables), facts)
@@ -220,9 +229,9 @@ def _zero_depth_notes(name: str, f: ZetaFit) -> list[str]:
         return []
     return [
         f"{name}: a straight line through the forces is zero at a depth of "
-        f"{1e3 * f.zero:.3g} mm: if the surface is there, count depth from it; "
-        "if not, the force is not in proportion to depth, "
-        "and zeta holds for these depths alone"
+        f"{1000.0 * f.zero:.3g} mm: if the surface is there, count depth from it; "
+        "otherwise the force is not proportional to depth, and zeta holds only for "
+        "these depths"
     ]
 
 

@@ -184,8 +184,8 @@ def run(
         seconds = time.process_time() - begin
         if seconds > longest and done < SHARE_OF_WALKS:
             raise Refusal(
-                f"after {longest:.0f} s of computing {done:.0%} is done, "
-                "and no cycle repeats itself",
+                f"after {longest:.0f} s of computing {done:.0%} is done, and no cycle "
+                "repeats",
                 instead="lower [numerics] duration, or lift the limit (``longest``)",
             )
         if progress:
@@ -206,7 +206,7 @@ def variables(scene: WalkerScene, run: Walked) -> list[Variable]:
 def means(scene: WalkerScene, run: Walked) -> list[Variable]:
     """Return the means over the limit cycle."""
     walk = run.walk
-    along = "mean over the limit cycle, along the heading"
+    along = "mean speed over the limit cycle, along the heading"
     of_steps = "part of the error of speed, from other numbers of steps"
     of_elements = "part of the error of speed, from twice as many elements"
     periodic = "1 if the limit cycle was found"
@@ -216,11 +216,11 @@ def means(scene: WalkerScene, run: Walked) -> list[Variable]:
         Variable("speed", (), walk.speed, "m/s", along, run.estimate),
         Variable("speed_error_of_steps", (), run.steps, "m/s", of_steps),
         Variable("speed_error_of_elements", (), run.elements, "m/s", of_elements),
-        Variable("frequency", (), scene.gait.frequency, "Hz", "of the gait"),
+        Variable("frequency", (), scene.gait.frequency, "Hz", "frequency of the gait"),
         Variable("cycles", (), walk.cycles, "1", "computed"),
     ]
     zero = "" if walk.spatial else "in the plane"  # the reason, of a planar walk
-    to_the_left = "mean, to the left of the heading"
+    to_the_left = "mean, positive to the left of the heading"
     for name, value, unit, error in (
         ("lateral_speed", walk.lateral_speed, "m/s", run.lateral),
         ("yaw_rate", walk.yaw_rate, "rad/s", run.turning),
@@ -228,7 +228,7 @@ def means(scene: WalkerScene, run: Walked) -> list[Variable]:
         found.append(Variable(name, (), value, unit, to_the_left, error, zero=zero))
     if not math.isnan(walk.settling_time):
         share = f"{100 * NEAR:g} %"
-        label = f"from rest until within {share} of the limit cycle, inf for never"
+        label = f"time from rest until within {share} of the limit cycle, inf for never"
         found.append(Variable("settling_time", (), walk.settling_time, "s", label))
     return found
 
@@ -240,14 +240,16 @@ def totals(scene: WalkerScene, run: Walked) -> list[Variable]:
     transport = cost_of_transport(scene, walk)
     of_weight = "work over weight times distance, from rest"
     share = "share of the work that the steps do not account for"
-    unsolved = "part of the error of speed, from unsolved steps"
+    unsolved = "part of the error of speed, from steps that did not converge"
     return [
-        Variable("total_work", (), walk.work[-1], "J", "of the motors"),
-        Variable("total_loss", (), walk.loss[-1], "J", "into the ground"),
+        Variable("total_work", (), walk.work[-1], "J", "work of the motors"),
+        Variable("total_loss", (), walk.loss[-1], "J", "work lost to the ground"),
         Variable("cost_of_transport", (), transport, "1", of_weight),
         Variable("unaccounted", (), walk.unaccounted, "1", share),
-        Variable("unsolved", (), walk.unsolved, "1", "steps that were taken unsolved"),
-        Variable("residual", (), walk.residual, "m/s", "largest of a step"),
+        Variable(
+            "unsolved", (), walk.unsolved, "1", "number of steps that did not converge"
+        ),
+        Variable("residual", (), walk.residual, "m/s", "largest residual of a step"),
         Variable("speed_error_of_unsolved", (), walk.unsolved_error, "m/s", unsolved),
     ]
 
@@ -463,11 +465,11 @@ class Settings:
                 if within.size:
                     coarsest[k, j] = measured.values[k, within[0]]
         over = ("setting", "tolerance")
-        label = "from which on the error is within the tolerance"
+        label = "time after which the error stays within the tolerance"
         return [
             Variable("tolerance", ("tolerance",), TOLERANCES, self.unit),
             Variable("coarsest_value", over, coarsest, "", label),
-            Variable("speed", (), self.near.speed, self.unit, "of the robot"),
+            Variable("speed", (), self.near.speed, self.unit, "speed of the robot"),
         ]
 
     def facts(self) -> dict[str, Any]:

@@ -102,7 +102,7 @@ def _require_no_pair(
         if {*pair} & {*planes} and {*pair} & {*geoms}:
             names = " and ".join(formatted(geom_name(model, g)) for g in pair)
             raise Refusal(
-                f"a <pair> of <contact> makes {names} touch", instead="drop it"
+                f"a <pair> of <contact> makes {names} touch", instead="remove it"
             )
 
 
@@ -146,7 +146,7 @@ def _masks_without_contacts(old: Masks, pairs: Iterable[Pair]) -> Masks:
         free = [bit for bit in range(N_BITS) if not used >> bit & 1]
         require(
             len(free) > 0,
-            "no bit is free to tell the floor from other geoms",
+            "no bit is left to distinguish the floor from other geoms",
             instead="use fewer contypes",
         )
         flag = 1 << free[0]

@@ -64,13 +64,20 @@ class Footprints:
     (100, 150)
     """
 
-    spacing: Annotated[float, Number(1e-4, 10, "m", "of the cells")]
-    length: Annotated[float, Number(1e-3, 1e4, "m", "of the grid along x")]
-    width: Annotated[float, Number(1e-3, 1e4, "m", "of the grid along y")]
-    x: Annotated[float, Number(-1e6, 1e6, "m", "middle of the grid")] = 0.0
-    y: Annotated[float, Number(-1e6, 1e6, "m", "middle of the grid")] = 0.0
+    spacing: Annotated[float, Number(1e-4, 10, "m", "size of the cells")]
+    length: Annotated[
+        float, Number(1e-3, 1e4, "m", "number of cells of the grid along x")
+    ]
+    width: Annotated[
+        float, Number(1e-3, 1e4, "m", "number of cells of the grid along y")
+    ]
+    x: Annotated[float, Number(-1e6, 1e6, "m", "x of the middle of the grid")] = 0.0
+    y: Annotated[float, Number(-1e6, 1e6, "m", "y of the middle of the grid")] = 0.0
     repose: Annotated[
-        float, Number(0.01, 1.5, "rad", "angle at which the ground slides by itself")
+        float,
+        Number(
+            0.01, 1.5, "rad", "angle of repose, at which the ground slides by itself"
+        ),
     ] = REPOSE
 
     def __post_init__(self):
@@ -78,7 +85,7 @@ class Footprints:
         rows, columns = self.shape
         require(
             rows * columns <= MAX_CELLS,
-            f"footprints have {rows * columns} cells, more than {MAX_CELLS}",
+            f"footprints would need {rows * columns} cells, more than {MAX_CELLS}",
         )
 
     @property

@@ -86,7 +86,7 @@ def _between_nodes(grid, quantity, i, j, s, t) -> float:
 def hills_of(model: mujoco.MjModel, name: str) -> tuple[Hills, int]:
     """Return the surface of a height field, given by the name of its geom, and the
     number of the geom."""
-    cure = "``level`` names a height field"
+    cure = "``level`` must name a height field"
     geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)
     require(geom >= 0, f"the model has no geom {formatted(name)}", instead=cure)
     kind = geom_kind(model, geom)

@@ -14,7 +14,10 @@ from rft.core.refusal import Refusal, formatted, require
 from rft.terradynamics.meshes.forces.zones import EVERYWHERE, Zones
 
 MAX_PLANES = 100  # of all regions
-CURE = "write it like 'x > 0.5' or '0 < x < 1 and y > 0.2 * x', x and y in m"
+CURE = (
+    "write a condition such as 'x > 0.5' or '0 < x < 1 and y > 0.2 * x', with x and y "
+    "in m"
+)
 UNREADABLE = (  # what parsing and evaluating a user's text may raise
     SyntaxError,
     ValueError,
@@ -33,7 +36,7 @@ def parse_zones(regions: Mapping[str, Any]) -> Zones:
     ground."""
     require(
         isinstance(regions, Mapping),
-        "``regions`` must be media by their conditions",
+        "``regions`` must map conditions to media",
         value=regions,
         instead=CURE,
     )
@@ -54,7 +57,7 @@ def parse_zones(regions: Mapping[str, Any]) -> Zones:
 def parse_planes(text: str) -> list[Linear]:
     """Return a, b and c of the planes within which a condition holds, a x + b y > c
     with a^2 + b^2 = 1."""
-    fault = f"the region {formatted(text)} is no condition on x and y"
+    fault = f"the region {formatted(text)} is not a condition on x and y"
     try:
         pairs = _pairs_of_sides(text)
     except UNREADABLE:

@@ -34,8 +34,8 @@ def choose_geoms(
         chosen, left_out = _split_by_touch(model, _movable_solids(model))
         require(
             len(chosen) > 0,
-            "the model has no geom that moves and has an inside",
-            instead="give it joints",
+            "no geom in the model is both solid and able to move",
+            instead="give the model joints",
         )
         return chosen, _notes_on_left_out(model, left_out)
 
@@ -51,7 +51,7 @@ def choose_geoms(
         meant, without_touch = _geoms_of_word(model, word)
         chosen += [g for g in meant if g not in chosen]
         left_out += [g for g in without_touch if g not in left_out]
-    require(len(chosen) > 0, "``geoms`` names none", value=geoms)
+    require(len(chosen) > 0, "``geoms`` selects no geom", value=geoms)
     for geom in chosen:
         _require_usable(model, geom)
     left_out = [g for g in left_out if g not in chosen]
@@ -89,13 +89,13 @@ def _require_usable(model: mujoco.MjModel, geom: int) -> None:
     name, kind = geom_label(model, geom), geom_kind(model, geom)
     require(
         kind in SOLID,
-        f"the geom {name} is a {kind} and has no inside",
-        instead=f"give a {', '.join(SOLID[:-1])} or {SOLID[-1]}",
+        f"the geom {name} is a {kind}, which is not solid",
+        instead=f"choose a {', '.join(SOLID[:-1])} or {SOLID[-1]}",
     )
     require(
         is_movable(model, geom),
         f"the geom {name} is fixed to the world",
-        instead="name geoms that move",
+        instead="choose geoms that move",
     )
 
 
@@ -133,7 +133,7 @@ def _geoms_of_group(model: mujoco.MjModel, group: int) -> list[int]:
     require(
         len(geoms) > 0,
         f"no geom is in group {group}",
-        instead=f"groups are {sorted({*model.geom_group.tolist()})}",
+        instead=f"the groups are {sorted({*model.geom_group.tolist()})}",
     )
     return geoms.tolist()
 
@@ -144,7 +144,7 @@ def _cure_of_unknown(word: str, geoms: list[str], bodies: list[str]) -> str:
     if near:
         return f"did you mean {', '.join(map(formatted, near))}?"
     if geoms:
-        return f"it has {', '.join(map(formatted, geoms[:NAMES_IN_CURE]))}"
+        return f"the geoms are {', '.join(map(formatted, geoms[:NAMES_IN_CURE]))}"
     return "it has none"
 
 
@@ -179,8 +179,8 @@ def _notes_on_left_out(model: mujoco.MjModel, left_out: list[int]) -> list[str]:
     if len(left_out) > 1:
         more = f" and {len(left_out) - 1} more"
     return [
-        f"the geom {name}{more}, which can touch nothing (contype = conaffinity = 0),"
-        " is not in the sand: name it in geoms to have it there"
+        f"the geom {name}{more}, which touches nothing (contype = conaffinity = 0), "
+        "is not in the sand: list it in geoms to include it"
     ]
 
 
@@ -197,8 +197,9 @@ def overlap_note(model: mujoco.MjModel, geoms: Sequence[int]) -> str:
     if len(pairs) > PAIRS_IN_NOTE:
         more = f" and {len(pairs) - PAIRS_IN_NOTE} more pairs"
     return (
-        "geoms of one body overlap, where the sand acts on both:"
-        f" {', '.join(named)}{more}; name those in ``geoms`` that are to be in the sand"
+        "geoms of one body overlap, and the sand acts on both: "
+        f"{', '.join(named)}{more}; list only the geoms that should be in the sand in "
+        "``geoms``"
     )
 
 

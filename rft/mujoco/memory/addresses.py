@@ -15,7 +15,7 @@ import numpy as np
 
 from rft.core.refusal import require
 
-UNKNOWN = f"MuJoCo {mujoco.__version__} is unknown"
+UNKNOWN = f"MuJoCo {mujoco.__version__} is not supported"
 # Bytes: where the search in a structure of 4.0, some 165 kB long, gives up.
 FARTHEST = 400_000
 POINTERS = 30  # words after the first that may hold the same address
@@ -193,8 +193,8 @@ def _require_known(is_known: bool) -> None:
     require(
         is_known,
         UNKNOWN,
-        because="its arrays are not where they are looked for",
-        instead="report it",
+        because="its arrays are not at the expected addresses",
+        instead="please report it",
     )
 
 
@@ -312,8 +312,8 @@ def _step_offset() -> int:
     require(
         offset > 0,
         UNKNOWN,
-        because="its time step is not where it is looked for",
-        instead="report it",
+        because="its time step is not at the expected address",
+        instead="please report it",
     )
     return offset
 

@@ -82,6 +82,6 @@ def compiled_c(function, arguments: tuple, purpose: str, *modules) -> CFunc:
     if purpose:
         compiled._cache = Cache(function, *modules)
         if not compiled._cache.path.exists():
-            print(f"compiling {purpose}: some seconds, once", file=sys.stderr)
+            print(f"compiling {purpose} (once, a few seconds)", file=sys.stderr)
     compiled.compile()
     return compiled

@@ -31,16 +31,20 @@ class Aeration(GroundEffect):
     air_speed: Annotated[
         float,
         Number(
-            0, 1e3, "m/s", "upward speed of the air over the bed's whole cross section"
+            0,
+            1e3,
+            "m/s",
+            "upward speed of the air, averaged over the cross section of the bed",
         ),
     ]
     fluidisation: Annotated[
-        float, Number(1e-6, 1e3, "m/s", "air speed from which the ground is fluidised")
+        float,
+        Number(1e-6, 1e3, "m/s", "air speed at which the ground becomes fluidised"),
     ]
 
     kind = "aeration"
     limit = "air_speed = 0"
-    cost = "one multiplication an element"
+    cost = "one multiplication per element"
     walks = True
 
     def __post_init__(self):
@@ -48,8 +52,8 @@ class Aeration(GroundEffect):
         require(
             self.air_speed < self.fluidisation,
             f"air_speed = {self.air_speed:g} m/s: the ground is fluidised from "
-            f"{self.fluidisation:g} m/s on, and no longer bears as this law says",
-            instead="give less",
+            f"{self.fluidisation:g} m/s, where this law no longer holds",
+            instead="give a lower speed",
         )
 
     def apply(self, ground: Ground) -> Ground:
@@ -58,7 +62,7 @@ class Aeration(GroundEffect):
 
     @property
     def assumes(self) -> str:
-        return "that strength falls to nothing at fluidisation, at all angles alike"
+        return "a strength that falls to zero at fluidisation, equally at all angles"
 
     @classmethod
     def examples(cls, x: float = 0.3) -> dict[str, Aeration]:

@@ -196,7 +196,7 @@ def checked_effects(effects) -> tuple[GroundEffect, ...]:
     duplicates = sorted({kind for kind in kinds if kinds.count(kind) > 1})
     require(
         not duplicates,
-        f"{', '.join(duplicates)} stands twice in effects",
-        instead="keep one",
+        f"{', '.join(duplicates)} appears twice in effects",
+        instead="keep one of them",
     )
     return tuple(effects)

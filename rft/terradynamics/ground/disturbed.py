@@ -46,7 +46,7 @@ class DisturbedGround(GroundEffect):
             1e-6,
             1e3,
             "m",
-            "distance along the ground to which intrusions disturb it, about",
+            "approximate distance along the ground to which intrusions disturb it",
         ),
     ]
     weakening: Annotated[
@@ -56,14 +56,14 @@ class DisturbedGround(GroundEffect):
     kind = "disturbed-ground"
     breaks = Premise.SE2_SYMMETRIC
     limit = "weakening = 0"
-    cost = "six operations an element and place"
+    cost = "six operations per element and place"
 
     def __post_init__(self):
         places = real_array("places", self.places)
         is_list = places.ndim == 1 and 1 <= places.size <= MOST_PLACES
         require(
             is_list and bool((np.abs(places) <= 1e3).all()),
-            f"places must be 1 to {MOST_PLACES} numbers in m, within 1000",
+            f"places must be 1 to {MOST_PLACES} numbers in m, each within 1000 m",
             value=self.places,
         )
         object.__setattr__(self, "places", tuple(places.tolist()))
@@ -79,7 +79,7 @@ class DisturbedGround(GroundEffect):
 
     @property
     def assumes(self) -> str:
-        return "its form and numbers, and that the motion itself disturbs nothing"
+        return "its form and numbers, and no disturbance by the motion itself"
 
     @classmethod
     def examples(cls, x: float = 0.3) -> dict[str, DisturbedGround]:

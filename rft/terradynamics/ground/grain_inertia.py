@@ -31,7 +31,13 @@ class GrainInertia(GroundEffect):
     """
 
     strength: Annotated[
-        float, Number(0, 1e6, "-", "lambda, 1 to 4 by grains and body; 1 is assumed")
+        float,
+        Number(
+            0,
+            1e6,
+            "-",
+            "lambda, 1 to 4 depending on grains and body; the default 1 is assumed",
+        ),
     ] = 1.0
     density: Annotated[
         float,
@@ -39,14 +45,14 @@ class GrainInertia(GroundEffect):
             0,
             1e5,
             "kg/m^3",
-            "density of the packed grains; that of loose poppy seeds if left out",
+            "density of the packed grains; the default is that of loose poppy seeds",
         ),
     ] = POPPY_SEEDS
 
     kind = "grain-inertia"
     breaks = Premise.RATE_INDEPENDENT
     limit = "strength = 0"  # in the rate of the motion the order is 2
-    cost = "five operations an element"
+    cost = "five operations per element"
     walks = True
 
     def __post_init__(self):
@@ -59,9 +65,11 @@ class GrainInertia(GroundEffect):
     def assumes(self) -> str:
         assumptions = []
         if self.strength == 1.0:
-            assumptions.append("lambda = 1 (1 to 4 are known)")
+            assumptions.append("lambda = 1 (values of 1 to 4 are known)")
         if self.density == POPPY_SEEDS:
-            assumptions.append(f"{POPPY_SEEDS:g} kg/m^3, of loose poppy seeds")
+            assumptions.append(
+                f"{POPPY_SEEDS:g} kg/m^3, the density of loose poppy seeds"
+            )
         return ", ".join(assumptions)
 
     @classmethod

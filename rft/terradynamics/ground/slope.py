@@ -52,7 +52,7 @@ class Slope(GroundEffect):
             -math.pi / 2,
             math.pi / 2,
             "rad",
-            "angle by which the surface rises; it falls if negative",
+            "angle by which the surface rises; negative if it falls",
         ),
     ]
     repose: Annotated[
@@ -61,14 +61,15 @@ class Slope(GroundEffect):
             0.01,
             1.5,
             "rad",
-            "angle at which the ground slides by itself, above that of the slope",
+            "angle of repose, at which the ground slides by itself; must exceed "
+            "the slope",
         ),
     ] = REPOSE
     mass: Annotated[float, Number(0, 1e6, "kg", "mass of the body")] = 0.0
 
     kind = "slope"
     limit = "angle = 0"
-    cost = "one multiplication an element"
+    cost = "one multiplication per element"
 
     def __post_init__(self):
         check_numbers(self)
@@ -91,13 +92,13 @@ class Slope(GroundEffect):
 
     @property
     def assumes(self) -> str:
-        downhill_only = "that only what moves downhill meets weaker ground"
+        downhill_only = "weaker ground only where a face moves downhill"
         if self.repose != REPOSE:
             return downhill_only
         repose = math.degrees(REPOSE)
         return (
-            f"an angle of repose of {repose:.1f} degrees, "
-            f"from half the drag downhill at 20, and {downhill_only}"
+            f"an angle of repose of {repose:.1f} degrees, from half the drag downhill "
+            f"at 20 degrees, and {downhill_only}"
         )
 
     @classmethod

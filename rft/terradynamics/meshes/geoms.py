@@ -183,7 +183,7 @@ def _model_mesh(model: mujoco.MjModel, k: int) -> Mesh:
     name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_MESH, k) or k
     with located(f"mesh {formatted(name)}"):
         mesh, notes = sound(_mesh_vertices(model, k), faces, cure="close it")
-    notes = [*notes, *size_note(mesh, "is the scale of its asset right?")]
+    notes = [*notes, *size_note(mesh, "is the scale of its asset correct?")]
     if notes:
         warnings.warn(f"mesh {formatted(name)}: {'; '.join(notes)}", Note, stacklevel=2)
     return mesh
@@ -196,7 +196,7 @@ def _solid_mesh(model: mujoco.MjModel, k: int, hulls: bool) -> Mesh:
     require(
         count <= MOST_FACES,
         f"the mesh has {count} triangles, more than {MOST_FACES}",
-        instead="give fewer",
+        instead="give fewer triangles",
     )
     try:
         return _model_mesh(model, k)
@@ -207,7 +207,7 @@ def _solid_mesh(model: mujoco.MjModel, k: int, hulls: bool) -> Mesh:
             refusal.what,
             where=refusal.where,
             because=refusal.because,
-            instead="close it, or let its convex hull stand for it: ``hulls`` = True",
+            instead="close it, or use its convex hull instead: ``hulls`` = True",
         ) from None
 
 

@@ -38,7 +38,7 @@ WIDEST = 2.0  # rad between two poses of a path
 
 Speed = Annotated[
     float,
-    Number(1e-9, 1e3, "m/s", "speed; it changes no force but that of grain inertia"),
+    Number(1e-9, 1e3, "m/s", "speed; it affects only the force of grain inertia"),
 ]
 Heading = Annotated[
     float,
@@ -50,7 +50,7 @@ Angle = Annotated[
         -1e3,
         1e3,
         "rad",
-        "angle about the axis, from the attitude, at one end of the motion",
+        "angle about the axis, relative to the attitude, at one end of the motion",
     ),
 ]
 
@@ -127,7 +127,9 @@ class Penetrate(Motion):
     array([ 0.  ,  0.  , -0.03])
     """
 
-    depth: Annotated[float, metres("depth of the lowest point at the end", 1e-9)]
+    depth: Annotated[
+        float, metres("depth of the lowest point at the end of the motion", 1e-9)
+    ]
     direction: Direction = math.pi / 2
     heading: Heading = 0.0
     speed: Speed = 0.01
@@ -245,7 +247,8 @@ class Path(Motion):
         n_rotations = {len(self.rx), len(self.ry), len(self.rz)}
         all_or_none = n_rotations in ({0}, {len(self.t)})
         require(
-            are_equal and all_or_none, "t, x, y, z and rx, ry, rz must be equally many"
+            are_equal and all_or_none,
+            "t, x, y, z and rx, ry, rz must have the same length",
         )
         require_ascending(self.t)
 
@@ -256,7 +259,7 @@ class Path(Motion):
             raise Refusal(
                 f"the body turns by {WIDEST:g} rad or more "
                 f"after t = {self.t[wide[0]]:g}",
-                instead="give poses between",
+                instead="give poses in between",
             )
 
     @property

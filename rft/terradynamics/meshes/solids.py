@@ -130,13 +130,15 @@ class Screw(Solid):
     """
 
     radius: Annotated[float, metres("radius of the thread")]
-    core: Annotated[float, metres("radius of the core, less than that of the thread")]
-    pitch: Annotated[float, metres("length along x of one turn of the thread")]
-    length: Annotated[float, metres("length of core and thread along x")]
+    core: Annotated[
+        float, metres("radius of the core, less than the radius of the thread")
+    ]
+    pitch: Annotated[float, metres("axial length of one turn of the thread")]
+    length: Annotated[float, metres("axial length of core and thread")]
     thickness: Annotated[
         float,
         metres(
-            "thickness of the blade along x, less than the pitch; 0 for a thread of a "
+            "axial thickness of the blade, less than the pitch; 0 for a thread with a "
             "smooth profile",
             0,
         ),
@@ -144,7 +146,7 @@ class Screw(Solid):
     nose: Annotated[
         float,
         metres(
-            "length of a cone at either end of the core, beyond the thread; 0 for flat "
+            "length of a cone at each end of the core, beyond the thread; 0 for flat "
             "ends",
             0,
         ),
@@ -160,8 +162,8 @@ class Screw(Solid):
         is_allowed = 1e-3 * self.pitch <= self.thickness < self.pitch
         require(
             self.thickness == 0 or is_allowed,
-            "thickness must be 0, or from a thousandth of the pitch to less than that, "
-            f"got {self.thickness:g} and {self.pitch:g}",
+            "thickness must be 0, or at least a thousandth of the pitch and less than "
+            f"the pitch, got {self.thickness:g} and {self.pitch:g}",
         )
         require(
             self.handed in HANDS,
@@ -170,8 +172,8 @@ class Screw(Solid):
         )
         require(
             self.turns <= MOST_TURNS,
-            f"the thread has {self.turns:.4g} turns, beyond {MOST_TURNS}",
-            because="length / pitch",
+            f"the thread has {self.turns:.4g} turns, more than {MOST_TURNS}",
+            instead="lower length / pitch",
         )
 
     @property
@@ -250,14 +252,16 @@ class Leg(Solid):
     True
     """
 
-    radius: Annotated[float, metres("R, half the distance from hip to free end")]
+    radius: Annotated[
+        float, metres("R, half the distance from the hip to the free end")
+    ]
     width: Annotated[float, metres("width across the plane, along y")]
     thickness: Annotated[float, metres("thickness of the strip, less than the radius")]
     relative_curvature: Annotated[
         float,
         Number(
             -1, 1, "-",
-            "R / r, -1 to 1, 1 for half a circle with its bulge to -x, ahead where a "
+            "R / r, -1 to 1; 1 is half a circle that bulges to -x, which leads when a "
             "positive rate about y sweeps the leg backwards",
         ),
     ] = 1.0  # fmt: skip
@@ -286,11 +290,10 @@ class Leg(Solid):
 class MeshFile(Solid):
     """The mesh of an STL, OBJ or PLY file (needs trimesh), in its own frame.
 
-    file (-): name of the file; in a scene file, from the scene's folder.
-    closed (-): whether the mesh must have an inside; of an open one either side may
-    lead.
-    smooth (-): whether the triangles stand for a curved surface, with edges where they
-    meet at more than 40 degrees.
+    file (-): name of the file, relative to the folder of a scene file. closed (-):
+    whether the mesh must have an inside; either side of an open mesh may lead. smooth
+    (-): whether the triangles represent a curved surface, with edges where they meet at
+    more than 40 degrees.
 
     Where more triangles are wanted than the file has, each is cut in four; the form
     stays the same.
@@ -299,7 +302,9 @@ class MeshFile(Solid):
     file: str
     scale: Annotated[
         float,
-        Number(1e-9, 1e9, "m", "length of a unit of the file, 0.001 if that is in mm"),
+        Number(
+            1e-9, 1e9, "m", "length of one unit of the file; 0.001 for a file in mm"
+        ),
     ] = 1.0
     closed: bool = True
     smooth: bool = False

@@ -37,7 +37,7 @@ LOOSE = StressMap(0.051, 0.047, 0.053, 0.083, 0.020, -0.026, 0.057, 0.0, 0.025)
 CLOSE = StressMap(0.094, 0.092, 0.092, 0.151, 0.035, -0.039, 0.086, 0.018, 0.046)
 
 # In three dimensions xi_n is chosen so that a level plate bears the same.
-OWN = f"its own nine coefficients; {LI}; a level plate bears"
+OWN = f"nine coefficients of its own; {LI}; a level plate carries"
 
 VERTICAL = {
     "generic": VerticalEntry(
@@ -45,11 +45,11 @@ VERTICAL = {
     ),
     "poppy-seeds-loose": VerticalEntry(
         LOOSE,
-        f"{OWN} 6 % more than by poppy-seeds-loose-scaled, in three dimensions too",
+        f"{OWN} 6 % more than by poppy-seeds-loose-scaled, also in three dimensions",
     ),
     "poppy-seeds-close": VerticalEntry(
         CLOSE,
-        f"{OWN} 10 % more than by poppy-seeds-close-scaled, in three dimensions too",
+        f"{OWN} 10 % more than by poppy-seeds-close-scaled, also in three dimensions",
     ),
     "glass-3mm": _scaled_entry(0.224, "3 mm glass spheres"),
     "poppy-seeds-loose-scaled": _scaled_entry(0.240, "loose poppy seeds"),

@@ -61,7 +61,8 @@ class PlateDrags(PlateStress):
             object.__setattr__(self, name, tuple(map(float, values)))
         sizes = {len(x) for x in (self.beta, self.gamma, self.alpha_x, self.alpha_z)}
         require(
-            len(sizes) == 1, "beta, gamma, alpha_x and alpha_z must be equally many"
+            len(sizes) == 1,
+            "beta, gamma, alpha_x and alpha_z must have the same length",
         )
         count = sizes.pop()
         require(
@@ -130,6 +131,6 @@ def _check_gaps(angles) -> None:
     b, g = np.degrees(square[distance.argmax()])
     require(
         np.degrees(distance.max()) <= FARTHEST,
-        f"no plate drag within {FARTHEST:g} degrees of "
-        f"beta = {b:.0f}, gamma = {g:.0f} degrees: measure some there",
+        f"no plate drag lies within {FARTHEST:g} degrees of beta = {b:.0f}, gamma = "
+        f"{g:.0f} degrees: measure some there",
     )

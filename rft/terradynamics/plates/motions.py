@@ -26,7 +26,7 @@ from rft.terradynamics.prescribed import (
     set_numbers,
 )
 
-Speed = Annotated[float, Number(1e-9, 1e3, "m/s", "speed; it changes no force")]
+Speed = Annotated[float, Number(1e-9, 1e3, "m/s", "speed; it affects no force")]
 Attitude = Annotated[float, Number(-10, 10, "rad", "angle at which the body is held")]
 Angle = Annotated[
     float,
@@ -96,7 +96,9 @@ class Penetrate(Motion):
     array([ 0.  , -0.05,  0.  ])
     """
 
-    depth: Annotated[float, metres("depth of the lowest point at the end", 1e-9)]
+    depth: Annotated[
+        float, metres("depth of the lowest point at the end of the motion", 1e-9)
+    ]
     direction: Direction = math.pi / 2
     speed: Speed = 0.01
     attitude: Attitude = 0.0
@@ -132,14 +134,12 @@ class Rotate(Motion):
             -1e3,
             1e3,
             "rad/s",
-            "rate of rotation, positive as it sweeps a leg that points down backwards",
+            "rate of rotation, positive if a leg that points down sweeps backwards",
         ),
     ] = 2 * math.pi
     start: Angle = -math.pi
     stop: Angle = math.pi
-    speed: Annotated[float, Number(-1e3, 1e3, "m/s", "speed of the hub, forwards")] = (
-        0.0
-    )
+    speed: Annotated[float, Number(-1e3, 1e3, "m/s", "forward speed of the hub")] = 0.0
     samples: Samples = 361
     turns = True
 
@@ -186,7 +186,7 @@ class Path(Motion):
         require(
             len(self.x) == len(self.z) == len(self.t)
             and len(self.angle) in (0, len(self.t)),
-            "t, x, z and angle must be equally many",
+            "t, x, z and angle must have the same length",
         )
         require_ascending(self.t)
 

@@ -50,7 +50,8 @@ class Outline:
         )
         require(
             2 <= len(points) <= MOST_ELEMENTS + 1,
-            f"an outline takes 1 to {MOST_ELEMENTS} elements, got {len(points) - 1}",
+            f"an outline must have 1 to {MOST_ELEMENTS} elements, got "
+            f"{len(points) - 1}",
         )
         require(
             bool((np.abs(points) <= LARGEST).all()),
@@ -136,7 +137,7 @@ def _check_simple(points, closed: bool) -> None:
     require(
         not short.size,
         f"points {short[:1]} and the next are the same",
-        instead="keep one",
+        instead="keep one of them",
     )
 
     if closed:
@@ -151,13 +152,13 @@ def _check_simple(points, closed: bool) -> None:
     require(
         not folds.size,
         f"the outline turns back onto itself after element {folds[:1]}",
-        instead="drop the point there",
+        instead="remove the point there",
     )
 
     i, j = _crossings(points, along, closed)
     require(
         not i.size,
-        f"elements {i[:1]} and {j[:1]} of the outline cross or touch",
+        f"elements {i[:1]} and {j[:1]} of the outline intersect or touch",
         instead="order its points along the edge",
     )
 

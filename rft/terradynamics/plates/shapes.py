@@ -21,7 +21,9 @@ FEWEST_ROUND = 8  # elements of a curve
 MOST_POINTS = 2000  # of a polygon or spline
 
 Width = Annotated[float, metres("width across the plane")]
-HalfLength = Annotated[float, metres("R, half the distance from hip to free end")]
+HalfLength = Annotated[
+    float, metres("R, half the distance from the hip to the free end")
+]
 
 
 class Shape:
@@ -65,7 +67,9 @@ class Plate(Shape):
 
     length: Annotated[float, metres("length in the plane")]
     width: Width
-    tilt: Annotated[float, Number(-100, 100, "rad", "beta, 0 lying flat")] = 0.0
+    tilt: Annotated[
+        float, Number(-100, 100, "rad", "beta, 0 for a plate that lies flat")
+    ] = 0.0
 
     def curve(self, elements: int):
         s = np.linspace(-0.5, 0.5, elements + 1)[:, None] * self.length
@@ -182,8 +186,8 @@ class CLeg(Shape):
         float,
         Number(
             -1, 1, "-",
-            "R / r, r that of the arc: 1 for half a circle, 0 for a flat leg, negative "
-            "for a reversed one, within +-1",
+            "R / r, where r is the radius of the arc: 1 for half a circle, 0 for a "
+            "flat leg, negative for a reversed leg, within +-1",
         ),
     ] = 1.0  # fmt: skip
 
@@ -243,8 +247,8 @@ class Wheel(Shape):
     lugs: Annotated[
         int, Number(0, 200, "-", "number of lugs, 0 to 200", whole=True)
     ] = 0
-    lug_height: Annotated[float, metres("height of a lug; 0 without lugs", 0)] = 0.0
-    lug_width: Annotated[float, metres("width of a lug; 0 without lugs", 0)] = 0.0
+    lug_height: Annotated[float, metres("height of a lug, 0 without lugs", 0)] = 0.0
+    lug_width: Annotated[float, metres("width of a lug, 0 without lugs", 0)] = 0.0
 
     def __post_init__(self):
         super().__post_init__()
@@ -252,7 +256,7 @@ class Wheel(Shape):
             require(
                 self.lug_height == self.lug_width == 0,
                 "lug_height and lug_width need lugs",
-                instead="say how many",
+                instead="give lugs",
             )
             return
         for name in ("lug_height", "lug_width"):
@@ -260,8 +264,8 @@ class Wheel(Shape):
         widest = 2 * self.radius * math.sin(math.pi / max(3, self.lugs))
         require(
             self.lug_width < widest,
-            f"lug_width must be below {widest:.3g} m, "
-            f"so that {self.lugs} lugs have room on the rim, got {self.lug_width:g}",
+            f"lug_width must be below {widest:.3g} m, so that {self.lugs} lugs fit on "
+            f"the rim, got {self.lug_width:g}",
         )
 
     def curve(self, elements: int):
@@ -303,8 +307,8 @@ class Wheel(Shape):
 class Polygon(Shape):
     """Straight edges between points.
 
-    points (m): (x, z) of each. closed (-): the last point is joined to the first, and
-    the body has an inside.
+    points (m): x and z of each point. closed (-): whether the last point is joined to
+    the first, so that the body has an inside.
 
     Examples
     --------
@@ -331,8 +335,8 @@ class Spline(Shape):
     """A smooth curve through points: a cubic spline whose parameter is the length of
     the chords.
 
-    points (m): (x, z) of each. closed (-): the last point is joined to the first, and
-    the body has an inside.
+    points (m): x and z of each point. closed (-): whether the last point is joined to
+    the first, so that the body has an inside.
 
     Examples
     --------
@@ -446,7 +450,7 @@ def _checked_points(points, closed) -> tuple[tuple[float, float], ...]:
     fewest = 3 if closed else 2
     require(
         fewest <= len(array) <= MOST_POINTS,
-        f"a {kind} outline takes {fewest} to {MOST_POINTS} points",
+        f"a {kind} outline must have {fewest} to {MOST_POINTS} points",
         value=len(array),
     )
     require(

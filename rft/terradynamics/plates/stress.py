@@ -29,23 +29,27 @@ def _coefficient(meaning: str) -> Number:
     return Number(-1e6, 1e6, "N/cm^3", meaning)
 
 
-CosineZ = Annotated[float, _coefficient("coefficient of a cosine of alpha_z")]
+CosineZ = Annotated[float, _coefficient("coefficient of a cosine in alpha_z")]
 SineZ = Annotated[
-    float, _coefficient("coefficient of a sine of alpha_z, m = -1 written m1")
+    float, _coefficient("coefficient of a sine in alpha_z, where m = -1 is written m1")
 ]
-CosineX = Annotated[float, _coefficient("coefficient of a cosine of alpha_x")]
-SineX = Annotated[float, _coefficient("coefficient of a sine of alpha_x")]
+CosineX = Annotated[float, _coefficient("coefficient of a cosine in alpha_x")]
+SineX = Annotated[float, _coefficient("coefficient of a sine in alpha_x")]
 Zeta = Annotated[
     float,
-    Number(1e-6, 1e6, "-", "strength of the medium over that of its coefficients"),
+    Number(
+        1e-6,
+        1e6,
+        "-",
+        "strength of the medium, by which its coefficients are multiplied",
+    ),
 ]
 Grazing = Annotated[
     float,
     Number(
         0, math.pi / 4, "rad",
-        "angle between motion and face over which the stress on the face of a closed "
-        "body rises, from none where it slides along itself to that of the map; 0 for "
-        "a jump",
+        "angle between motion and face over which the stress on a face of a closed "
+        "body rises from zero to its value in the map; 0 for a jump",
     ),
 ]  # fmt: skip
 

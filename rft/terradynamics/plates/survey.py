@@ -51,13 +51,13 @@ class Survey:
         if self.pulling:
             pulls = f"pulls on {100 * self.pulling:.1f} % of the plane"
         if not self.pushing:
-            return f"takes power at all angles, {pulls}"
+            return f"dissipates at all angles, {pulls}"
         row, column = np.unravel_index(self.power.argmax(), self.power.shape)
         beta = np.degrees(self.beta[row])
         gamma = np.degrees(self.gamma[column])
         return (
-            f"drives motion on over {100 * self.pushing:.1f} % of the plane, "
-            f"most at beta = {beta:.0f}, gamma = {gamma:.0f} degrees; {pulls}"
+            f"drives the motion on {100 * self.pushing:.1f} % of the plane, most at "
+            f"beta = {beta:.0f}, gamma = {gamma:.0f} degrees; {pulls}"
         )
 
 

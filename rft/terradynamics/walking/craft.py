@@ -22,7 +22,8 @@ PER_SQUARE = 10  # triangles of a screw over the square of the number of element
 
 @dataclass(frozen=True)
 class Screws(Robot):
-    """Two screws under a box, which has all the mass. x forwards, y to the left, z up.
+    """Two screws under a box that carries all the mass. x forwards, y to the left, z
+    up.
 
     screw (-): the left screw; both drive forwards. pair (-): "mirrored", the right
     screw is the mirror image of the left and rotates in the other direction, or
@@ -43,7 +44,7 @@ class Screws(Robot):
     width: Annotated[float, metres("width of the box about the centre of mass")]
     height: Annotated[float, metres("height of the box about the centre of mass")]
     screw: Screw
-    track: Annotated[float, metres("distance from one axis to the other")]
+    track: Annotated[float, metres("distance between the axes")]
     drop: Annotated[
         float, metres("depth of the axes below the centre of mass", -LARGEST)
     ] = 0.0

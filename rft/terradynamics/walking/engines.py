@@ -50,9 +50,9 @@ class Walker:
         for effect in self.effects:
             require(
                 effect.walks,
-                "walking takes the effects aeration and grain-inertia, not "
+                "walking supports the effects aeration and grain-inertia, not "
                 f"{effect.kind}",
-                instead="drop it",
+                instead="remove it",
             )
 
     @property
@@ -65,8 +65,8 @@ class Walker:
 class Fineness:
     """Numerical settings of a walk.
 
-    engine (-): planar or mujoco; by default planar, but mujoco for robots and ground of
-    three dimensions.
+    engine (-): planar or mujoco; the default is planar, or mujoco for robots and ground
+    in three dimensions.
 
     Examples
     --------
@@ -76,7 +76,7 @@ class Fineness:
     """
 
     steps: Annotated[
-        int, Number(8, 10_000, "-", "time steps of a cycle", whole=True)
+        int, Number(8, 10_000, "-", "number of time steps per cycle", whole=True)
     ] = 32
     elements: Annotated[
         int,
@@ -84,7 +84,7 @@ class Fineness:
             4,
             1000,
             "-",
-            "elements of a leg's outline; the belly has as many",
+            "number of elements of a leg's outline, and of the belly",
             whole=True,
         ),
     ] = 12
@@ -92,12 +92,12 @@ class Fineness:
         float,
         Number(
             SMALLEST_ROUNDING, 0.1, "m/s",
-            "speed below which drag falls off in proportion to speed; of slow legs it "
-            "is no more than 5 % of the speed of their ends",
+            "speed below which drag falls in proportion to speed; for slow legs at "
+            "most 5 % of the speed of their ends",
         ),
     ] = 3e-3  # fmt: skip
     duration: Annotated[
-        float, Number(1e-3, 1e4, "s", "time of walking from rest, at most")
+        float, Number(1e-3, 1e4, "s", "longest time of walking from rest")
     ] = 10.0
     engine: str | None = None
 

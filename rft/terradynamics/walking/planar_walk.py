@@ -43,12 +43,12 @@ def refuse(walker: Walker) -> None:
     """Raise ValueError for a walker that this engine cannot compute."""
     require(
         isinstance(walker.robot, Rhex | Roller),
-        f"the planar engine knows no {type(walker.robot).__name__} robot",
+        f"the planar engine does not support a {type(walker.robot).__name__} robot",
         instead="use ``engine`` mujoco",
     )
     require(
         isinstance(walker.stress, PlateStress),
-        "a law of three dimensions takes ``engine`` mujoco",
+        "a law of three dimensions needs ``engine`` mujoco",
     )
 
 

@@ -31,7 +31,7 @@ SMALLEST_ROUNDING = 1e-7  # m/s
 # stand.
 LARGEST_ROUNDING_SHARE = 0.05
 
-Mass = Annotated[float, Number(1e-6, 1e4, "kg", "mass of all that moves")]
+Mass = Annotated[float, Number(1e-6, 1e4, "kg", "mass of everything that moves")]
 Axle = Annotated[
     float,
     metres(
@@ -59,17 +59,23 @@ class Tripod:
     0.5
     """
 
-    frequency: Annotated[float, Number(1e-3, 200, "Hz", "turns a second")]
+    frequency: Annotated[float, Number(1e-3, 200, "Hz", "turns per second")]
     duty: Annotated[
         float,
         Number(
-            0.01, 0.99, "-", "share of the cycle in which a leg stands, 0.01 to 0.99"
+            0.01,
+            0.99,
+            "-",
+            "share of the cycle in which a leg is in stance, 0.01 to 0.99",
         ),
     ] = 0.5
     sweep: Annotated[
         float,
         Number(
-            0.01, 2 * math.pi - 0.01, "rad", "angle by which a leg turns as it stands"
+            0.01,
+            2 * math.pi - 0.01,
+            "rad",
+            "angle through which a leg turns during stance",
         ),
     ] = math.pi
     middle: Annotated[
@@ -200,12 +206,12 @@ class Rhex(Robot):
     """A box on two legs at each hip, which differ by half a cycle and alternate from
     hip to hip: an alternating tripod.
 
-    hips (m): x of each hip from the centre of mass.
+    hips (m): x of each hip, from the centre of mass.
 
-    aside (m): distance of the legs at each hip from the middle plane, one on either
-    side, for the engine of three dimensions. By default legs touch the box; of an odd
-    number of hips every second one has its legs farther out, so that a tripod with
-    equal forces on its legs neither rolls nor yaws the body.
+    aside (m): distance of the two legs at each hip from the middle plane, for the
+    engine of three dimensions. By default legs touch the box. With an odd number of
+    hips the legs of every second hip are farther out, so that a tripod with equal
+    forces on its legs neither rolls nor yaws the body.
 
     Examples
     --------
@@ -231,7 +237,7 @@ class Rhex(Robot):
             1e-12,
             1e5,
             "kg m^2",
-            "moment of inertia of pitching; that of the box where none is given",
+            "moment of inertia in pitch; if left out, that of the box",
         ),
     ] = None
     axle: Axle = 0.0
@@ -317,7 +323,7 @@ class Roller(Robot):
 
     mass: Annotated[
         float,
-        Number(1e-6, 1e4, "kg", "mass of all that the wheel carries, and its own"),
+        Number(1e-6, 1e4, "kg", "mass of the wheel and all that it carries"),
     ]
     legs: Shape
     axle: Axle = 0.0

@@ -76,7 +76,7 @@ def rolling(
     require(
         radius is not None,
         f"a {type(wheel).__name__} has no radius",
-        instead="give one",
+        instead="give it a radius",
     )
     require(bool((np.abs(slip) <= 100).all()), "slip must be within +-100", value=slip)
     in_range("load", load, 1e-6, 1e6)

@@ -154,7 +154,7 @@ class Field:
     def _refuse_masks(self) -> None:
         if self.masked:
             raise Refusal(
-                "a field with singular shapes is not looked up between its points",
+                "a field with singular shapes cannot be interpolated",
                 instead="use the direct tier",
             )
 
@@ -197,8 +197,8 @@ def inside(axes, alpha, names: Sequence[str] = ()) -> np.ndarray:
             if names:
                 name = names[k]
             raise Refusal(
-                f"{name} = {worst:.4g} rad lies outside the field's"
-                f" {first:g} to {last:g}",
+                f"{name} = {worst:.4g} rad lies outside the field, which covers "
+                f"{first:g} to {last:g}",
                 instead="widen the extent or lower the amplitude",
             )
     return alpha

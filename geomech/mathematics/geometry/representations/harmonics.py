@@ -175,11 +175,11 @@ def fit(
     check_fit_options(degree, progress)
     d = len(axes)
     if d < 2:
-        raise Refusal("harmonics are those of two joint rates or more, got 1 joint")
+        raise Refusal("harmonics need two or more joint rates, got 1 joint")
     if d > 2 and count < terms(d, highest):
         raise Refusal(
-            f"harmonics of {d} joints up to {highest} take {terms(d, highest)}"
-            f" directions or more, got {count}"
+            f"harmonics of {d} joints up to {highest} need at least "
+            f"{terms(d, highest)} directions, got {count}"
         )
 
     unit = directions(d, count)

@@ -349,9 +349,9 @@ class Tube(Connection):
         if beyond.any():
             shape = ", ".join(f"{x:.3g}" for x in alpha[beyond][0])
             raise Refusal(
-                f"the data do not reach alpha = ({shape}), {reach.max():.2g} times as"
-                " far from the mean gait as they go",
-                instead="keep near that gait, or measure more varied cycles",
+                f"the data do not reach alpha = ({shape}), which is {reach.max():.2g} "
+                "times as far from the mean gait as they extend",
+                instead="stay near that gait, or measure cycles that vary more",
             )
         return alpha
 

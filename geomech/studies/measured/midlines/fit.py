@@ -147,9 +147,9 @@ def fit_midlines(
     clock = kinematics.clock(curve, repeat)
     if clock.ratio < kinematics.STANDING:
         raise trial.wrong(
-            "the body bends in one shape to and fro",
+            "the body bends back and forth in one shape",
             because="no wave runs along it",
-            instead="give a trial of a body along which one runs",
+            instead="give a trial of a body with a travelling wave",
         )
     marks, used = full_cycles(trial, curve, clock)
     turn, words = _head(trial, used_cycles(curve, clock, marks, used), head)
@@ -198,13 +198,13 @@ def period(trial: Trial) -> float:
     if not repeat:
         raise trial.wrong(
             "the body does not repeat its motion",
-            instead="give one cycle at least, better eight, of one gait",
+            instead="give at least one cycle of one gait, preferably eight",
         )
     rows = repeat / np.median(np.diff(trial.t))
     if rows < ROWS:
         raise trial.wrong(
-            f"{rows:.2g} frames a cycle are too few",
-            instead=f"give at least {ROWS}, better 30",
+            f"{rows:.2g} frames per cycle are too few",
+            instead=f"give at least {ROWS}, preferably 30",
         )
     return repeat
 
@@ -227,18 +227,18 @@ def _with_length(trial: Trial, curve: smooth.Curve) -> Trial:
     if trial.unit == "m" and not SHORTEST < length < LONGEST:
         raise trial.wrong(
             f"the body is {length:.3g} m long",
-            instead="say the unit of x and y: mm, cm or px by ``units``",
+            instead="give the unit of x and y with ``units``: mm, cm or px",
         )
     if trial.unit == "BL" and not 1 / LARGEST_RATIO < length < LARGEST_RATIO:
         raise trial.wrong(
             f"the body is {length:.3g} body lengths long",
-            instead="say the unit of x and y by ``units``",
+            instead="give the unit of x and y with ``units``",
         )
     if trial.length is not None and length > LARGEST_RATIO * trial.length:
         raise trial.wrong(
-            f"the points lie along {length:.3g} and the body is {trial.length:.3g}"
-            " long",
-            instead="give ``body_length`` in the unit of x and y, which ``units`` says",
+            f"the points extend over {length:.3g}, but the body is {trial.length:.3g} "
+            "long",
+            instead="give ``body_length`` in the unit of x and y, which ``units`` sets",
         )
     return trial
 
@@ -255,7 +255,7 @@ def full_cycles(
         turns = (phase[-1] - phase[0]) / (2 * np.pi)
         raise trial.wrong(
             f"the trial has {turns:.2g} cycles",
-            instead="give one full cycle at least, better eight",
+            instead="give at least one full cycle, preferably eight",
         )
     times = kinematics.times(clock, phase, marks)
     _check_pace(trial, times)
@@ -266,9 +266,10 @@ def full_cycles(
         gaps = np.diff(trial.t)
         widest = int(gaps.argmax())
         raise trial.wrong(
-            f"no frames for {gaps[widest]:.3g} after this one, and so in every cycle",
+            f"no frames follow for {gaps[widest]:.3g} after this one, so that "
+            "every cycle has a gap",
             widest,
-            instead="give a trial with one cycle at least that has no gap",
+            instead="give a trial with at least one cycle without a gap",
         )
     _check_alike(trial, kinematics.cycles(curve, times).selected(used))
     return marks, used
@@ -282,8 +283,11 @@ def _check_growing(trial: Trial, t: np.ndarray, phase: np.ndarray) -> None:
     bad = np.flatnonzero(ahead < LEAST_AHEAD)
     if bad.size:
         raise trial.wrong(
-            f"the motion stands, or is another one, after t = {t[bad[0]]:.4g}",
-            instead="cut pauses, starts and other gaits out, and give each its file",
+            f"the motion pauses or changes after t = {t[bad[0]]:.4g}",
+            instead=(
+                "cut out pauses, starts and other gaits, and give each gait its own "
+                "file"
+            ),
         )
 
 
@@ -300,9 +304,12 @@ def _check_pace(trial: Trial, times: np.ndarray) -> None:
     k = int(np.abs(np.log(np.maximum(ratio, 1e-6))).argmax())
     if not 1 / PACE < ratio[k] < PACE:
         raise trial.wrong(
-            f"the cycle from t = {times[k]:.4g} to {times[k + 1]:.4g} takes"
-            f" {ratio[k]:.2g} times as long as most",
-            instead="cut pauses, starts and other gaits out, and give each its file",
+            f"the cycle from t = {times[k]:.4g} to {times[k + 1]:.4g} takes "
+            f"{ratio[k]:.2g} times as long as most others",
+            instead=(
+                "cut out pauses, starts and other gaits, and give each gait its own "
+                "file"
+            ),
         )
 
 
@@ -318,7 +325,7 @@ def _check_alike(trial: Trial, cycles: kinematics.Cycles) -> None:
         raise trial.wrong(
             f"the cycle from t = {start:.4g} to {end:.4g} does not repeat the others"
             f" (correlation {correlation[k]:.2g})",
-            instead="cut it out, and give each gait a file",
+            instead="cut it out, and give each gait its own file",
         )
 
 
@@ -348,14 +355,14 @@ def _head(
         return is_first, words
     if motion and motion != wave:
         raise trial.wrong(
-            f"the body moves towards its point {ends[motion > 0]}, and so does its"
-            " wave",
+            f"the body moves towards its {ends[motion > 0]} point, and so does its "
+            "wave",
             because="most swimmers move head first against their wave",
-            instead="say which end is the head, ``head`` first or last",
+            instead="state which end is the head: ``head`` first or last",
         )
-    evidence = "the wave runs away from it; the body hardly moves"
+    evidence = "the wave travels away from it, and the body hardly moves"
     if motion:
-        evidence = "it moves there, against its wave"
+        evidence = "the body moves towards it, against its wave"
     return wave < 0, f"{ends[wave > 0]}, by the motion: {evidence}"
 
 
@@ -368,8 +375,8 @@ def _ends_note(trial: Trial, curve: smooth.Curve) -> list[str]:
     if share > WHOLE:
         return []
     return [
-        f"the points cover {share:.0%} of the body: slip, amplitude, heading and turn"
-        " are those of that piece"
+        f"the points cover {share:.0%} of the body: slip, amplitude, heading and turn "
+        "are those of the covered part"
     ]
 
 
@@ -378,8 +385,8 @@ def _notes(used: np.ndarray) -> list[str]:
     count = len(used)
     if count == 1:
         return [
-            "one full cycle does not show how cycles vary: intervals are of the"
-            " tracking's noise alone"
+            "one full cycle does not show how cycles vary: intervals include only the "
+            "noise of the tracking"
         ]
     if count < FEWEST:
         return ["two full cycles hardly show how cycles vary"]

@@ -204,9 +204,9 @@ def _notes(fit: Kinematics, predicted: np.ndarray, ends: np.ndarray) -> tuple[st
     stride = COMPARED.index("stride")
     change = ends[stride] / predicted[stride]
     return (
-        "the prediction is that of the piece of the body that has points,"
-        f" {1 / (1 + missing):.0%} of it: the ends may change the distance by"
-        f" {change:.1%} at most, which its interval contains",
+        "the prediction describes the part of the body that has points, "
+        f"{1 / (1 + missing):.0%} of it: the ends may change the distance by at most "
+        f"{change:.1%}, which its interval includes",
     )
 
 

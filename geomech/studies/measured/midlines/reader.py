@@ -72,12 +72,12 @@ SINGLE = "single"  # DeepLabCut's name for points that belong to no animal
 DEEPLABCUT = "DeepLabCut"
 SLEAP = "SLEAP"
 UNTRACKED = {  # what to do about animals that a file does not tell apart
-    SLEAP: "track them in SLEAP and export again, or export one of them",
-    "": "add a column track with the name of each, or give each a file",
+    SLEAP: "track them in SLEAP and export again, or export one animal",
+    "": "add a column track with the name of each animal, or give each its own file",
 }
 HEADERS = (
-    "give a CSV file with a header such as t,point,x,y or t,x1,y1,x2,y2, or one of"
-    " DeepLabCut"
+    "give a CSV file with a header such as t,point,x,y or t,x1,y1,x2,y2, or the file "
+    "of DeepLabCut"
 )
 
 
@@ -172,13 +172,13 @@ def read(
         choose("``y``", y, ("up", "down"))
     elif pixels:
         notes.append(
-            "y is taken to run down, as in images, else heading and turn have the other"
-            " sign: say y up"
+            "y is assumed to point down, as in images; if it points up, give ``y`` up, "
+            "or heading and turn have the wrong sign"
         )
     else:
         notes.append(
-            "y is taken to run up, else heading and turn have the other sign: say y"
-            " down"
+            "y is assumed to point up; if it points down, give ``y`` down, or "
+            "heading and turn have the wrong sign"
         )
     if y == "down" or (y is None and pixels):
         xy[..., 1] *= -1
@@ -215,9 +215,9 @@ def _dropped_note(low: np.ndarray, found: int, least: float) -> list[str]:
     if low.sum() <= MANY * found:
         return []
     return [
-        f"MANY POINTS ARE DROPPED: {low.sum() / found:.2g} of those that the tracker"
-        f" found have a score below {least:g}; if they are good, say a lower"
-        " least_score"
+        f"MANY POINTS ARE LEFT OUT: {low.sum() / found:.2g} of the points that the "
+        f"tracker found have a score below {least:g}; if they are good, lower "
+        "``least_score``"
     ]
 
 
@@ -228,10 +228,10 @@ def _missing_note(xy: np.ndarray, low: np.ndarray) -> list[str]:
         return []
     score = ""
     if low.any():
-        score = f", {low.mean():.2g} of all by their likelihood"
+        score = f", {low.mean():.2g} of all because of their likelihood"
     return [
-        f"{lost.mean():.2g} of all points are missing{score}: modes along the body"
-        " stand for them"
+        f"{lost.mean():.2g} of all points are missing{score}: modes along the body "
+        "replace them"
     ]
 
 
@@ -244,17 +244,17 @@ def _table(source: Rows, individual: str | None = None) -> Table:
     bare = {split_unit(name)[0]: k for k, name in enumerate(header)}
     if {"s", "curvature"} <= {*bare}:
         raise Refusal(
-            "curvature alone says nothing of where the body went",
+            "curvature alone does not show where the body went",
             where=source.place,
-            instead="give points of the midline, or take the file for [gait] kind ="
-            ' "centreline"',
+            instead="give points of the midline, or use the file in [gait] kind = "
+            '"centreline"',
         )
     twice = [c for k, c in enumerate(header) if c in header[:k]]
     if twice:
         raise Refusal(
-            f"the column {formatted(twice[0])} is there twice",
+            f"the column {formatted(twice[0])} appears twice",
             where=source.place,
-            instead="rename one",
+            instead="rename one of them",
         )
     is_sleap = "instance.score" in header or {"track", "frame_idx"} <= {*header}
     program = SLEAP if is_sleap else ""
@@ -277,11 +277,12 @@ def _refuse_labelled(source: Rows) -> None:
         images = [cell for cell in source.cells(text)[:3] if IMAGE.search(cell)]
         if images:
             raise Refusal(
-                f"{formatted(images[-1], 40)} is an image: these are labelled frames,"
-                " picked to train a tracker, not a film",
+                f"{formatted(images[-1], 40)} is an image: these are frames labelled "
+                "to train a tracker, not a film",
                 where=f"{source.name}, line {line}",
-                instead="give the file that DeepLabCut writes when it analyses the"
-                " film, or number the frames of one film in a column frame",
+                instead="give the file that DeepLabCut writes when it analyses the "
+                "film, or add a column frame that numbers the frames of one "
+                "film",
             )
 
 
@@ -295,8 +296,8 @@ def _of_one_animal(source: Rows, individual: str | None) -> Rows:
             raise Refusal(
                 "no column names animals",
                 where=source.place,
-                because=f"it has {formatted(', '.join(header), 120)}",
-                instead="drop ``individual``, or add a column track",
+                because=f"the columns are {formatted(', '.join(header), 120)}",
+                instead="remove ``individual``, or add a column track",
             )
         return source
     rows = []
@@ -310,9 +311,9 @@ def _of_one_animal(source: Rows, individual: str | None) -> Rows:
             rows.append((line, text))
     if individual is None and len(animals) > 1:
         raise Refusal(
-            f"{len(animals)} animals are in it: {', '.join([*animals][:6])}",
+            f"it contains {len(animals)} animals: {', '.join([*animals][:6])}",
             where=source.name,
-            instead="name one by ``individual``",
+            instead="choose one with ``individual``",
         )
     if not rows:
         choose("``individual``", individual, animals)
@@ -324,8 +325,8 @@ def _refuse_animals(source: Rows, frame: np.ndarray, program: str = "") -> None:
     counts = np.bincount(frame)
     if (counts > 1).mean() > SEVERAL:
         raise Refusal(
-            f"{int(counts.max())} animals without a track: {(counts > 1).mean():.2g} of"
-            " the times have several rows",
+            f"{int(counts.max())} animals without a track: {(counts > 1).mean():.2g} "
+            "of the times have several rows",
             where=source.name,
             instead=UNTRACKED[program or ""],
         )
@@ -372,8 +373,8 @@ def _clock(header: Sequence[str], place: str) -> tuple[int, str, bool]:
     raise Refusal(
         "no column t or frame",
         where=place,
-        because=f"it has {formatted(', '.join(header), 120)}",
-        instead="name the column of the time t",
+        because=f"the columns are {formatted(', '.join(header), 120)}",
+        instead="call the column of the time t",
     )
 
 
@@ -389,11 +390,10 @@ def _cells(source: Rows, picks: Sequence[int]) -> np.ndarray:
         cells = source.cells(text)
         if len(cells) != width:
             raise Refusal(
-                f"{len(cells)} cells under {width} columns",
+                f"{len(cells)} cells in a table of {width} columns",
                 where=f"{source.name}, line {line}",
-                instead="mend that row; a point that was not found is an empty cell "
-                "between two"
-                " separators",
+                instead="correct that row; leave the cell of a missing point empty, "
+                "between two separators",
             )
         for j, pick in enumerate(picks):
             values[k, j] = _number(cells[pick], source, line, pick)
@@ -407,9 +407,9 @@ def _number(cell: str, source: Rows, line: int, column: int) -> float:
     if cell.lower() in MISSING:
         return math.nan
     raise Refusal(
-        f"{formatted(cell, 30)} is no number up to {LARGEST_NUMBER:g}",
+        f"{formatted(cell, 30)} is not a number of at most {LARGEST_NUMBER:g}",
         where=f"{source.name}, line {line}, column {source.header[1][column]}",
-        instead="mend it, or leave the cell empty where the point was not found",
+        instead="correct it, or leave the cell empty where the point was not found",
     )
 
 
@@ -421,7 +421,7 @@ def _common_unit(names: Sequence[str], where: str) -> str:
         raise Refusal(
             f"columns in {' and in '.join(sorted(u or 'no unit' for u in units))}",
             where=where,
-            instead="give all x and y in one unit",
+            instead="give all x and y in the same unit",
         )
     unit = units.pop()
     if unit not in ("", "px", "BL", *LENGTHS):
@@ -490,10 +490,11 @@ def _unnamed(
     if bad.size:
         line = source.lines[np.flatnonzero(frame == bad[0])[0]]
         raise Refusal(
-            f"{counts[bad[0]]} points at t = {t[bad[0]]:g}, and {usual} at most others",
+            f"{counts[bad[0]]} points at t = {t[bad[0]]:g}, but at most {usual} "
+            "at other times",
             where=f"{source.name}, line {line}",
-            instead="number the points in a column `point`, so that missing ones have a"
-            " place",
+            instead="number the points in a column `point`, so that missing points "
+            "are recognised",
         )
     point = np.zeros(len(frame), int)
     for k in range(len(t)):
@@ -512,7 +513,7 @@ def _check_once(t, frame, point, names, source: Rows) -> None:
         raise Refusal(
             f"point {names[point[again]]} is given twice at t = {t[frame[again]]:g}",
             where=f"{source.name}, line {source.lines[again]}",
-            instead="keep one, or name animals in a column track",
+            instead="keep one of them, or name the animals in a column track",
         )
 
 
@@ -527,7 +528,7 @@ def _parse_wide(
         raise Refusal(
             "no columns of points",
             where=source.place,
-            because=f"it has {formatted(', '.join(header), 120)}",
+            because=f"the columns are {formatted(', '.join(header), 120)}",
             instead=HEADERS,
         )
     clock, second, timed = _clock(header, source.place)
@@ -560,7 +561,7 @@ def _parse_frames(
             cure = "keep one of the rows"
         else:
             what = f"t = {t[k]:.6g} comes after {t[k - 1]:.6g}"
-            cure = "sort the rows by time, one for each"
+            cure = "sort the rows by time, with one row for each"
         raise Refusal(what, where=f"{source.name}, line {lines[k]}", instead=cure)
     values = np.full((len(t), len(pairs), 3), np.inf)
     place = {pick: j for j, pick in enumerate(picks)}
@@ -603,7 +604,7 @@ def _deeplabcut(source: Rows, individual: str | None) -> Table:
         )
     if "z" in heads["coords"]:
         raise Refusal(
-            "it has points in three dimensions, and midlines are plane",
+            "it has points in three dimensions, but midlines are planar",
             where=source.place,
             instead="give the file of one camera, or x and y as frame,nose_x,nose_y",
         )
@@ -644,9 +645,9 @@ def _chosen(
     with_points = [name for name in names if points[name] and name != SINGLE]
     if len(with_points) != 1:
         raise Refusal(
-            f"{len(with_points)} individuals are in it: {', '.join(with_points[:6])}",
+            f"it contains {len(with_points)} individuals: {', '.join(with_points[:6])}",
             where=source.name,
-            instead="name one by ``individual``",
+            instead="choose one with ``individual``",
         )
     chosen = with_points[0]
     others = []
@@ -655,7 +656,7 @@ def _chosen(
             others.append(f"{name} (points of no animal)")
         elif name != chosen:
             others.append(f"{name} (no point)")
-    return chosen, [f"{', '.join(others)} left out: say individual to take it"]
+    return chosen, [f"{', '.join(others)} left out: use ``individual`` to choose one"]
 
 
 def _selected(table: Table, name: str, points: Sequence[str]) -> Table:
@@ -669,7 +670,7 @@ def _selected(table: Table, name: str, points: Sequence[str]) -> Table:
         raise Refusal(
             "``columns`` name a point twice",
             where=name,
-            instead="name each once, from one end of the body",
+            instead="list each once, from one end of the body",
         )
     picks = [lower.index(x.strip().lower()) for x in points]
     names = tuple(table.names[k] for k in picks)
@@ -685,13 +686,15 @@ def _check(table: Table, name: str) -> None:
         raise Refusal(
             f"{points} points along the body",
             where=name,
-            instead=f"give {FEWEST_POINTS} to {MOST_POINTS}, better 10",
+            instead=f"give {FEWEST_POINTS} to {MOST_POINTS}, preferably 10",
         )
     if frames < FEWEST_FRAMES:
         raise Refusal(
             f"{frames} frames",
             where=name,
-            instead="give a whole trial, 20 frames a cycle for at least one cycle",
+            instead=(
+                "give a whole trial, with 20 frames per cycle for at least one cycle"
+            ),
         )
 
 
@@ -702,16 +705,16 @@ def _unit(
     assumptions."""
     if units and table.unit and units != table.unit and table.unit != "px":
         raise Refusal(
-            f"x and y are in {table.unit} by the names of their columns",
+            f"the column names give x and y in {table.unit}",
             where=name,
-            instead="drop ``units``",
+            instead="remove ``units``",
         )
     unit = units or table.unit
     if scale is not None and unit not in ("px", ""):
         raise Refusal(
-            "``scale`` is that of pixels",
+            "``scale`` applies to pixels",
             where=name,
-            instead=f"drop it, x and y are in {unit}",
+            instead=f"remove it: x and y are in {unit}",
         )
     if scale is not None:
         return "m", scale * 1e-3, []
@@ -720,10 +723,14 @@ def _unit(
     if unit == "BL":
         return "BL", 1.0, []
     note = (
-        "lengths are in body lengths alone: nobody says the unit of x and y, say units"
+        "lengths are in body lengths only: the unit of x and y is unknown; add "
+        "``units``, such as mm"
     )
     if unit == "px":
-        note = "lengths are in body lengths alone: nobody says how long a pixel is"
+        note = (
+            "lengths are in body lengths only: the size of a pixel is unknown; add "
+            "``scale``, the mm per pixel"
+        )
     return "", 1.0, [note]
 
 
@@ -732,8 +739,8 @@ def _time(table: Table, fps: float | None) -> tuple[np.ndarray, bool, list[str]]
     if table.timed:
         if fps is not None:
             raise Refusal(
-                "``fps`` is that of a file that counts frames",
-                instead="drop it, the file has a time",
+                "``fps`` applies to a file that counts frames",
+                instead="remove it: the file has a time",
             )
         return table.t, True, []
     if fps is not None:
@@ -741,5 +748,5 @@ def _time(table: Table, fps: float | None) -> tuple[np.ndarray, bool, list[str]]
     return (
         table.t,
         False,
-        ["times are in frames: nobody says how many there are in a second, say fps"],
+        ["times are in frames: the frame rate is unknown; add ``fps``, such as 250"],
     )

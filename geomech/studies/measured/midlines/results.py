@@ -14,18 +14,18 @@ from geomech.studies.measured.midlines.kinematics import PARTS, QUANTITIES
 from geomech.studies.measured.midlines.predicted import COMPARED, Comparison
 
 LABELS = {
-    "frequency": "cycles per time",
-    "body_length": "from end to end",
+    "frequency": "cycles per unit of time",
+    "body_length": "length from end to end",
     "speed": "distance of the body's mean frame over time",
     "stride": "distance per cycle",
     "heading": "direction of travel, counter-clockwise from x",
-    "drift": "direction of travel less the mean heading of the body",
+    "drift": "direction of travel minus the mean heading of the body",
     "turn": "turn of the body per cycle",
-    "slip": "mean angle between body and velocity",
+    "slip": "mean angle between the body and its velocity",
     "efficiency": "wave efficiency: stride over wavelength",
-    "amplitude": "half the range across the way, body's mean",
-    "wavelength": "along the way",
-    "arc_wavelength": "along the body",
+    "amplitude": "half the range across the direction of travel, mean over the body",
+    "wavelength": "measured along the direction of travel",
+    "arc_wavelength": "measured along the body",
 }
 SOURCES = ("cycles", "noise", "smoothing")  # of errors
 
@@ -53,7 +53,7 @@ def units_of(fit: Kinematics) -> dict[str, str]:
 def trial_result(fit: Kinematics, comparison: Comparison | None = None) -> Result:
     """Return all numbers of a trial. The errors are half widths of intervals."""
     units = units_of(fit)
-    label = f"half width of the interval of {100 * fit.level:.3g} % of cases"
+    label = f"half width of the {100 * fit.level:.3g} % confidence interval"
     variables = [*_quantities(fit, units, label), *_along(fit, units, label)]
     variables += [*_sources(fit, units), *_cycles(fit, units), *_mean_cycle(fit)]
     variables += _track(fit)
@@ -77,7 +77,7 @@ def _quantities(fit: Kinematics, units: dict[str, str], label: str) -> list[Vari
         )  # fmt: skip
         variables.append(variable)
     noise = float(fit.curve.noise / fit.value("body_length")[0])
-    variables.append(Variable("noise", (), noise, "BL", "of a point"))
+    variables.append(Variable("noise", (), noise, "BL", "noise of a point"))
     return variables
 
 
@@ -109,7 +109,8 @@ def _sources(fit: Kinematics, units: dict[str, str]) -> list[Variable]:
         Variable("source", ("source",), np.array(SOURCES)),
         Variable(
             "standard_error", ("quantity", "source"), parts[: len(QUANTITIES)],
-            tuple(units[name] for name in QUANTITIES), "of each source",
+            tuple(units[name] for name in QUANTITIES),
+            "standard error from each source",
         ),
     ]  # fmt: skip
 
@@ -118,7 +119,7 @@ def _cycles(fit: Kinematics, units: dict[str, str]) -> list[Variable]:
     """Return the quantities of each cycle."""
     time = fit.trial.unit_of_time
     variables = [
-        Variable("cycle_start", ("cycle",), _starts(fit), time, "when a cycle begins")
+        Variable("cycle_start", ("cycle",), _starts(fit), time, "start of a cycle")
     ]
     for k, name in enumerate(QUANTITIES):
         values = fit.intervals.per_cycle[:, k]
@@ -145,13 +146,13 @@ def _mean_cycle(fit: Kinematics) -> list[Variable]:
     if len(headings) > 1:
         error = headings.std(0, ddof=1) / np.sqrt(len(headings))
     phase = 2 * np.pi * (np.arange(kinematics.PHASES) + 0.5) / kinematics.PHASES
-    on_body = "on the body, tail 0 to head 1"
+    on_body = "place on the body, tail 0 to head 1"
     return [
-        Variable("phase", ("phase",), phase, "rad", "of the mean cycle"),
+        Variable("phase", ("phase",), phase, "rad", "phase of the mean cycle"),
         Variable("place", ("place",), fit.curve.places, "1", on_body),
         Variable(
             "mean_cycle", ("phase", "place"), each.mean(0), "rad",
-            "headings less their mean", error,
+            "headings minus their mean", error,
             error_label="standard error of the mean over cycles",
         ),
     ]  # fmt: skip
@@ -165,7 +166,7 @@ def _track(fit: Kinematics) -> list[Variable]:
     first = place[0]
     track_dims = ("cycle", "phase")
     midline_dims = ("phase", "place")
-    mean = "mean of the body"
+    mean = "mean position of the body"
     of_first = "midlines of the first cycle"
     return [
         Variable("track_x", track_dims, centre.real, unit, mean),
@@ -204,13 +205,13 @@ def _compared(
     over = ("compared",)
     unit, _ = _unit_of_track(fit)
     track = _predicted_track(fit, c)
-    label = "of the body when a cycle begins, predicted"
+    label = "position of the body at the start of a cycle, predicted"
     return [
         *variables,
         Variable("compared", over, np.array(COMPARED)),
         Variable(
             "apart", over, distance, "1",
-            "distance of measured and predicted over the errors of both together",
+            "distance between measured and predicted values over their combined errors",
         ),
         Variable("track_x_predicted", ("begin",), track.real, unit, label),
         Variable("track_y_predicted", ("begin",), track.imag, unit, label),
@@ -243,15 +244,15 @@ def _closing(c: Comparison, label: str) -> list[Variable]:
     present = np.array([x.present for x in c.closing])
     return [
         Variable("parameter", over, np.array([x.name for x in c.closing])),
-        Variable("parameter_present", over, present, units, "in the medium"),
+        Variable("parameter_present", over, present, units, "value in the medium"),
         Variable(
             "parameter_closing", over, value, units,
-            "which makes the predicted stride the measured one; nan where none does",
+            "value that reproduces the measured stride; nan where none does",
             error, error_label=label,
         ),
         Variable("bound", ("bound",), np.array(["low", "high"])),
         Variable(
-            "parameter_tried", ("parameter", "bound"), tried, units, "range tried"
+            "parameter_tried", ("parameter", "bound"), tried, units, "range searched"
         ),
     ]  # fmt: skip
 
@@ -274,7 +275,7 @@ def _about(fit: Kinematics, comparison: Comparison | None) -> dict[str, Any]:
         "modes": int(curve.modes),
         "knots_per_cycle": float((len(curve.knots) - 11) / n_cycles),
         "level": float(fit.level),
-        "frame_meaning": "mean of the body's points and mean heading; heading "
+        "frame_meaning": "mean of the body's points, and mean heading, "
         "counter-clockwise from x",
     }
     if comparison is not None:

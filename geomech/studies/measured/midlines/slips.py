@@ -79,8 +79,8 @@ def _without_poor_frames(trial: Trial) -> Trial:
         )
     k = int(np.flatnonzero(poor)[0])
     return trial.with_notes(
-        f"{poor.sum()} frames with fewer than {KNOWN:.0%} of the points are left out,"
-        f" the first at line {trial.lines[k, 0]}",
+        f"{poor.sum()} frames with fewer than {KNOWN:.0%} of the points are left out, "
+        f"the first at line {trial.lines[k, 0]}",
         t=trial.t[enough],
         points=trial.points[enough],
         lines=trial.lines[enough],
@@ -94,8 +94,8 @@ def _check_scale(trial: Trial) -> None:
     if (usual == 0).any():
         k = int(usual.argmin())
         raise trial.wrong(
-            f"points {trial.names[k]} and {trial.names[k + 1]} are in one place",
-            instead="drop one with ``columns``",
+            f"points {trial.names[k]} and {trial.names[k + 1]} coincide",
+            instead="remove one with ``columns``",
         )
     expected = np.where(np.isnan(chords), np.nan, usual)
     size = np.nansum(chords, 1) / np.nansum(expected, 1)
@@ -109,7 +109,7 @@ def _check_scale(trial: Trial) -> None:
         raise trial.wrong(
             f"the body is {size[k]:.3g} times as long as in most frames{like}",
             k,
-            instead="mend or drop that frame",
+            instead="correct or remove that frame",
         )
 
 
@@ -122,9 +122,11 @@ def _check_order(trial: Trial) -> None:
     if forth.min() < -0.5:
         k = int(forth.argmin())
         raise trial.wrong(
-            f"from {trial.names[k]} by {trial.names[k + 1]} to {trial.names[k + 2]} the"
-            " body turns back in most frames",
-            because="points are out of order, or lie left and right of the midline",
+            f"the body turns back from {trial.names[k]} by {trial.names[k + 1]} to "
+            f"{trial.names[k + 2]} in most frames",
+            because=(
+                "points are out of order, or lie to the left and right of the midline"
+            ),
             instead="give points of the midline in their order, with ``columns``",
         )
 
@@ -143,16 +145,16 @@ def _rotated(trial: Trial, mend: bool) -> Trial:
     if not state.any():
         return trial
     k = int(np.flatnonzero(state)[0])
-    what = f"{state.sum()} frames run from the other end of the body"
+    what = f"{state.sum()} frames start at the other end of the body"
     if not mend:
         raise trial.wrong(
-            f"{what}, the first is this one",
+            f"{what}, of which this is the first",
             k,
-            instead="turn the order of their points round, or say ``mend``",
+            instead="reverse the order of their points, or add ``mend``",
         )
     points = np.where(state[:, None, None], x[:, ::-1], x)
     return trial.with_notes(
-        f"{what} and are turned round, the first at line {trial.lines[k, 0]}",
+        f"{what} and are reversed, the first at line {trial.lines[k, 0]}",
         points=points,
     )
 
@@ -182,7 +184,7 @@ def _without_jumps(trial: Trial, mend: bool) -> Trial:
     if len(places) > NAMED:
         text = f"{text} and {len(places) - NAMED} more"
     return trial.with_notes(
-        f"{len(places)} points that jump or swap are taken for missing: {text}",
+        f"{len(places)} points that jump or swap are treated as missing: {text}",
         points=np.where(bad[..., None], np.nan, x),
     )
 
@@ -200,8 +202,8 @@ def _jump(
     x = trial.points[frame]
     others = np.flatnonzero(bad[frame])
     cure = (
-        "mend them, leave their cells empty, or say ``mend`` to have such points left"
-        " out"
+        "correct them, leave their cells empty, or add ``mend`` to leave such points "
+        "out"
     )
     for other in others[others != point]:
         swapped = (
@@ -217,7 +219,8 @@ def _jump(
             )
     size = distance[frame, point] / np.nansum(usual_chords(trial.points))
     return trial.wrong(
-        f"it jumps by {size:.2g} body lengths from where it is in the frames around",
+        f"it jumps by {size:.2g} body lengths from its place in the neighbouring "
+        "frames",
         frame,
         point,
         instead=cure,

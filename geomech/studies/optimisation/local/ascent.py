@@ -177,7 +177,7 @@ class _Ascent:
     def __call__(self, x: np.ndarray) -> None:
         self.steps += 1
         if not self.is_same_stroke(x):
-            raise RuntimeError("a loop of another number of strokes")
+            raise RuntimeError("a loop with a different number of strokes")
         if not np.isfinite(x).all():
             return
         value = np.inf

@@ -51,9 +51,9 @@ class Objective:
             choose("``direction``", self.direction, DIRECTIONS)
             if self.name == "turning":
                 raise Refusal(
-                    "``direction`` is that of a displacement",
-                    because="turning takes none",
-                    instead="drop it",
+                    "``direction`` applies to displacement",
+                    because="turning has no direction",
+                    instead="remove it",
                 )
         for name in ("rate", "power"):
             limit = getattr(self, name)
@@ -62,8 +62,8 @@ class Objective:
             in_range(f"``{name}``", limit, 1e-9, 1e9)
             if self.name != "speed":
                 raise Refusal(
-                    f"``{name}`` limits speed",
-                    instead="say ``objective`` speed, or drop it",
+                    f"``{name}`` limits a speed",
+                    instead="use ``objective`` speed, or remove it",
                 )
 
     @property

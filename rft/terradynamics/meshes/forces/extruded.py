@@ -128,8 +128,8 @@ class Extruded:
     def __post_init__(self):
         require(
             isinstance(self.stress, StressMap),
-            f"stress must be a StressMap, nine coefficients, "
-            f"got {formatted(self.stress)}: fit some to plate drags",
+            "stress must be a StressMap with nine coefficients, got "
+            f"{formatted(self.stress)}: fit one to plate drags",
         )
 
     def __getattr__(self, name: str) -> float:

@@ -181,7 +181,7 @@ class Spatial:
             1,
             1e12,
             "N/m^3",
-            "strength, 1 to 1e12: a plate pushed straight down bears 0.875 xi_n |z|",
+            "strength, 1 to 1e12; a plate pushed straight down carries 0.875 xi_n |z|",
         ),
     ]
     surface_friction: Annotated[
@@ -189,7 +189,7 @@ class Spatial:
         Number(
             0, 10, "-",
             "friction of grains on the intruder, 0 to 10; the stress along a face is "
-            "at most that times the one across",
+            "at most this times the stress across it",
         ),
     ] = 0.4  # fmt: skip  # assumed: glass or plastic on grains
     tension: str = "cut"
@@ -197,8 +197,8 @@ class Spatial:
         float,
         Number(
             0, 0.5, "rad",
-            "0 to 0.5, 0 for a jump; stress grows from 0 to its own as the velocity "
-            "turns by that angle out of the face",
+            "angle, 0 to 0.5, between velocity and face over which the stress grows "
+            "from 0 to its full value; 0 for a jump",
         ),
     ] = math.radians(2.0)  # fmt: skip  # assumed
 

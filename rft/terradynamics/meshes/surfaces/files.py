@@ -41,11 +41,11 @@ def read(path, closed: bool = True, scale: float = 1.0) -> Mesh:
     `Note`, says what was mended.
     """
     kind = str(path).rpartition(".")[2].lower()
-    require(kind in KINDS, "a mesh is an .stl, .obj or .ply file", where=path)
+    require(kind in KINDS, "a mesh must be an .stl, .obj or .ply file", where=path)
     vertices, faces = _load(Path(path), kind)
     require(
         faces.ndim == 2 and len(faces) > 0,
-        f"{path} is no {kind.upper()} mesh",
+        f"{path} is not a valid {kind.upper()} mesh",
         because="it has no triangles",
     )
     with located(path):
@@ -55,10 +55,10 @@ def read(path, closed: bool = True, scale: float = 1.0) -> Mesh:
         require(
             not size > LARGEST,
             f"the mesh is {size:.4g} m large, beyond {LARGEST:g} m",
-            instead="give scale, 0.001 if it is in mm",
+            instead="give scale, which is 0.001 for a mesh in mm",
         )
         mesh, notes = sound(vertices * scale, faces, closed, OPEN_CURE)
-    notes = [*notes, *size_note(mesh, f"is scale = {scale:g} right?")]
+    notes = [*notes, *size_note(mesh, f"is scale = {scale:g} correct?")]
     if notes:
         warnings.warn(f"{path}: {'; '.join(notes)}", Note, stacklevel=2)
     return mesh
@@ -72,12 +72,12 @@ def _require_readable(data: bytes) -> None:
     require(
         not ZERO.search(data),
         "a face names vertex 0, where vertices count from 1",
-        instead="mend the mesh",
+        instead="correct the mesh",
     )
     back = BACK.search(data)
     require(
         back is None or not VERTEX.search(data, back.end()),
-        "a face counts vertices back, and vertices follow it",
+        "a face counts vertices backwards, but vertices follow it",
         instead="count from 1, or put all vertices first",
     )
 
@@ -86,7 +86,7 @@ def _load(path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
     """Return (vertices, faces) of an ordinary file of at most `LARGEST_FILE` bytes."""
     try:
         size = path.stat().st_size
-        require(path.is_file(), f"{path} is no ordinary file")
+        require(path.is_file(), f"{path} is not an ordinary file")
         require(
             size <= LARGEST_FILE,
             f"{path} is larger than {LARGEST_FILE / 1e6:.0f} MB",
@@ -104,9 +104,9 @@ def _load(path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
     least, most = _announced_triangles(kind, data)
     require(
         least <= len(faces) <= most or not len(faces),
-        f"{path} is no {kind.upper()} mesh",
+        f"{path} is not a complete {kind.upper()} mesh",
         because=f"it announces {least:,} triangles, and {len(faces):,} can be read",
-        instead="write it anew in the program that made it",
+        instead="export it again from the program that created it",
     )
     return vertices, faces
 
@@ -121,9 +121,9 @@ def _plain(kind: str, data: bytes) -> bytes:
         records = int.from_bytes(data[80:84], "little")
         require(
             _has_records(data),
-            "the file is cut off, or is no STL mesh",
+            "the file is incomplete or is not an STL mesh",
             because=f"it announces {records:,} triangles in {len(data):,} bytes",
-            instead="write it anew in the program that made it",
+            instead="export it again from the program that created it",
         )
         return data
     is_binary_ply = kind == "ply" and b"format binary" in data[:200]
@@ -171,8 +171,10 @@ def _parse(path: Path, kind: str, data: bytes) -> tuple[np.ndarray, np.ndarray]:
         # trimesh raises many kinds of errors for a file that is no mesh.
         reason = formatted(str(error))
         if "could not be read" in str(error):
-            reason = "a number in it cannot be read"
-        raise Refusal(f"{path} is no {kind.upper()} mesh", because=reason) from None
+            reason = "one of its numbers cannot be read"
+        raise Refusal(
+            f"{path} is not a valid {kind.upper()} mesh", because=reason
+        ) from None
 
 
 @contextlib.contextmanager

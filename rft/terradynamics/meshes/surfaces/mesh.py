@@ -61,7 +61,7 @@ class Mesh:
         )
         require(
             0 < len(faces) <= MOST_TRIANGLES,
-            f"a mesh has 1 to {MOST_TRIANGLES:,} triangles, got {len(faces):,}",
+            f"a mesh must have 1 to {MOST_TRIANGLES:,} triangles, got {len(faces):,}",
         )
         require(bool(np.isfinite(vertices).all()), "vertices must be finite")
         require_vertices(faces, len(vertices))
@@ -104,15 +104,17 @@ class Mesh:
         is_hidden = shells.is_enclosed(self.vertices, parts)
         require(
             sum(n_outside) == len(faces) and not is_hidden.any(),
-            "a shell or wall lies inside the mesh",
+            "the mesh has an inner shell or wall",
             because="no grains touch it",
-            instead="leave it out, as rft.terradynamics.meshes.surfaces.sound does",
+            instead=(
+                "remove it, for example with rft.terradynamics.meshes.surfaces.sound"
+            ),
         )
         require(
             all(shells.volume(self.vertices[part]) > 0 for part in parts),
             "the mesh is inside out",
             because="its normals point inwards",
-            instead="turn the triangles round",
+            instead="reverse the triangles",
         )
 
     def _open_refusal(self, surplus: np.ndarray) -> Refusal:
@@ -121,16 +123,19 @@ class Mesh:
         _, uses = np.unique(surplus, axis=0, return_counts=True)
         if (uses > 1).any() or self._has_doubles():
             return Refusal(
-                "the mesh has an edge that two triangles run along the same way",
-                because="some are turned inside out, or there are doubles",
-                instead="mend them, as rft.terradynamics.meshes.surfaces.sound does",
+                "two triangles run along an edge of the mesh in the same direction",
+                because="some triangles are reversed or duplicated",
+                instead=(
+                    "repair them, for example with "
+                    "rft.terradynamics.meshes.surfaces.sound"
+                ),
             )
-        cure = "close it, or say closed = false if it is a sheet"
+        cure = "close it, or use closed = false if it is a sheet"
         if shells.nearly_closes(self.vertices, self.faces):
-            cure = "close it, as rft.terradynamics.meshes.surfaces.sound does"
+            cure = "close it, for example with rft.terradynamics.meshes.surfaces.sound"
         return Refusal(
             "the mesh is open",
-            because=f"{len(surplus)} edges have one triangle",
+            because=f"{len(surplus)} edges have only one triangle",
             instead=cure,
         )
 
@@ -215,9 +220,11 @@ class Mesh:
         for part in sheets:
             require(
                 not shells.nearly_closes(self.vertices, self.faces[part]),
-                "closed = false is for sheets, and the mesh nearly closes",
-                because="its inside would bear, too",
-                instead="close it, as rft.terradynamics.meshes.surfaces.sound does",
+                "closed = false is for sheets, but the mesh is almost closed",
+                because="its inside would also carry stress",
+                instead=(
+                    "close it, for example with rft.terradynamics.meshes.surfaces.sound"
+                ),
             )
         back = np.sort(np.concatenate([*sheets, np.empty(0, int)]))
         normals = self.smooth_normals
@@ -328,6 +335,7 @@ def require_vertices(faces: np.ndarray, count: int) -> None:
     unknown = faces[(faces < 0) | (faces >= count)]
     if len(unknown):
         raise Refusal(
-            f"a face names vertex {unknown[0]}, where vertices are 0 to {count - 1}",
-            instead="mend the mesh",
+            f"a face names vertex {unknown[0]}, but vertices are numbered 0 to "
+            f"{count - 1}",
+            instead="correct the mesh",
         )

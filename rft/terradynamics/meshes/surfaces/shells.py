@@ -264,7 +264,7 @@ def is_enclosed(vertices: np.ndarray, parts: list[np.ndarray]) -> np.ndarray:
     require(
         count <= MOST_SHELLS,
         f"the mesh has {count:,} closed shells, more than {MOST_SHELLS:,}",
-        instead="give one body",
+        instead="give a single body",
     )
     inside = np.zeros(count, bool)
     if count == 1:
@@ -294,9 +294,9 @@ def is_enclosed(vertices: np.ndarray, parts: list[np.ndarray]) -> np.ndarray:
 
 def _crossing_refusal() -> Refusal:
     return Refusal(
-        "parts of the mesh cross or touch",
-        because="grains do not touch the faces of one that lie in another",
-        instead="unite them (Boolean union) in the program that made the mesh",
+        "parts of the mesh intersect or touch",
+        because="grains do not touch faces inside another part",
+        instead="unite them (Boolean union) in the program that created the mesh",
     )
 
 

@@ -27,7 +27,7 @@ FOLDED = -0.99999  # cosine of the angle between normals, 0.26 degrees from a fo
 FOLDS = 1e-4  # of the surface: area of folds below which they are rounding
 MOST_FLAT = 1000  # triangles without area that are merged, each in a search
 MOST_WALLS = 20  # within a body, which are tried in turn
-OPEN_CURE = "close it, or say closed = false if it is a sheet"
+OPEN_CURE = "close it, or use closed = false if it is a sheet"
 
 
 class Sound(NamedTuple):
@@ -70,7 +70,7 @@ def sound(
     require(bool(np.isfinite(vertices).all()), "vertices must be finite")
     require(
         0 < len(faces) <= MOST_TRIANGLES,
-        f"a mesh has 1 to {MOST_TRIANGLES:,} triangles, got {len(faces):,}",
+        f"a mesh must have 1 to {MOST_TRIANGLES:,} triangles, got {len(faces):,}",
     )
     require_vertices(faces, len(vertices))
     return _Mender(vertices, faces, cure).mend(closed)
@@ -178,7 +178,7 @@ class _Mender:
         n_dropped = len(self.faces) - len(best.faces)
         self.faces = best.faces
         self.notes.append(
-            f"corners within {best.distance:.2g} m of others welded: {best.n_corners:,}"
+            f"{best.n_corners:,} corners welded to others within {best.distance:.2g} m"
         )
         self.note(n_dropped, "triangle", "without area left out")
         return True
@@ -217,7 +217,7 @@ class _Mender:
         is_even = np.sum([a < b, b < c, c < a], axis=0) == 2
         number = self.corner_sets()
         _, first = np.unique(2 * number + is_even, return_index=True)
-        self.note(len(number) - len(first), "double triangle", "left out")
+        self.note(len(number) - len(first), "duplicate triangle", "left out")
         self.faces = self.faces[np.sort(first)]
         back = self.back_to_back()
         if not len(back):
@@ -261,12 +261,12 @@ class _Mender:
             return
         require(
             is_reversed is not None,
-            "the mesh has one side only, as a Moebius strip",
-            instead="mend it in the program that made it",
+            "the mesh has only one side, like a Moebius strip",
+            instead="correct it in the program that created it",
         )
         self.faces[is_reversed] = self.faces[is_reversed][:, ::-1]
         count = int(is_reversed.sum())
-        self.note(count, "triangle", "wound against the others turned")
+        self.note(count, "triangle", "wound against the others reversed")
 
     def drop_single_walls(self) -> None:
         """Leave out the surface that ends at edges of others and lies within the body
@@ -341,7 +341,7 @@ class _Mender:
             count = len(shells.excess_edges(faces))
             raise Refusal(
                 "the mesh is open",
-                because=f"{count} edges have one triangle",
+                because=f"{count} edges have only one triangle",
                 instead=self.cure,
             )
 
@@ -374,9 +374,9 @@ class _Mender:
         self.note(
             n_enclosed,
             "triangle",
-            f"of {n_shells} inside another left out, as no grains touch them",
+            f"of {n_shells} inside another left out, because no grains touch them",
         )
-        self.note(n_reversed, "triangle", "of shells that were inside out turned")
+        self.note(n_reversed, "triangle", "of shells that were inside out reversed")
         return outermost
 
     def keep_sheets(self, solids: list, sheets: list) -> list[np.ndarray]:
@@ -385,19 +385,19 @@ class _Mender:
         for part in sheets:
             require(
                 not shells.nearly_closes(self.vertices, self.faces[part]),
-                "closed = false is for sheets, and the mesh nearly closes",
-                because="its inside would bear, too",
+                "closed = false is for sheets, but the mesh is almost closed",
+                because="its inside would also carry stress",
                 instead="leave closed = false out: its holes are then filled",
             )
         require(
             len(sheets) > 0,
-            "closed = false is for sheets, and the mesh is closed",
+            "closed = false is for sheets, but the mesh is closed",
             instead="leave closed = false out",
         )
         kept_shells = [self.faces[part] for part in sheets]
         if solids:
             kept_shells += self.outermost_shells([self.faces[part] for part in solids])
-            self.note(len(solids), "closed shell", "beside sheets taken as solid")
+            self.note(len(solids), "closed shell", "next to sheets treated as solid")
         return kept_shells
 
     def merge_flat(self, faces: np.ndarray) -> np.ndarray:
@@ -450,8 +450,8 @@ class _Mender:
         require(
             share < FOLDS,
             f"{len(folded)} triangles are folded back on their neighbours",
-            because="likely of polygons that are not convex",
-            instead="write triangles in the program that made the mesh",
+            because="probably from polygons that are not convex",
+            instead="export triangles from the program that created the mesh",
         )
 
     def is_flat(self, faces: np.ndarray) -> np.ndarray:

@@ -29,9 +29,9 @@ MISSING = "an MJCF needs MuJoCo: pip install 'geomech[mujoco]'"
 class Mjcf(Robot):
     """A robot of an MJCF file, walking along x, the ground at z = 0.
 
-    mjcf (-): name of the file; in a scene file, from the scene's folder. geoms (-):
-    names of the geoms that touch the ground, and nothing else. actuators (-): names of
-    the <position> or <velocity> actuators that the gait's clock drives; by default all
+    mjcf (-): name of the file, relative to the folder of a scene file. geoms (-): names
+    of the geoms that touch the ground, and of no others. actuators (-): names of the
+    <position> or <velocity> actuators that the clock of the gait drives; by default all
     of them. phases (-): phase of each of these actuators, in cycles; by default 0.
 
     Other actuators keep the controls of the first keyframe, or 0. The robot starts as
@@ -59,7 +59,7 @@ class Mjcf(Robot):
         require(
             len(self.geoms) > 0,
             "a robot without legs",
-            because="geoms must name those that touch the ground",
+            because="geoms must list the geoms that touch the ground",
         )
         model, digest = _compile_model(self.mjcf)
         object.__setattr__(self, "digest", digest)
@@ -81,7 +81,7 @@ class Mjcf(Robot):
         )
         require(
             len(set(value)) == len(value),
-            f"{field_name} names one twice",
+            f"{field_name} lists a name twice",
             instead=formatted(value),
         )
         object.__setattr__(self, field_name, tuple(value))
@@ -117,7 +117,7 @@ class Mjcf(Robot):
                 not fixed,
                 f"the geom {formatted(name)} is fixed to the world",
                 where=self.mjcf,
-                instead="name those of the robot",
+                instead="list geoms of the robot",
             )
             numbers.append(geom)
         object.__setattr__(self, "geom_numbers", np.array(numbers))
@@ -138,7 +138,7 @@ class Mjcf(Robot):
         if near:
             cure = f"did you mean {formatted(near[0])}?"
         elif names:
-            cure = f"it has {', '.join(names[:8])}"
+            cure = f"the names are {', '.join(names[:8])}"
             if len(names) > 8:
                 cure += ", ..."
         else:
@@ -158,7 +158,7 @@ class Mjcf(Robot):
         require(
             model.na == 0,
             f"{self.mjcf} has actuators with a state of their own",
-            instead="drop their dyntype",
+            instead="remove their dyntype",
         )
         driven = self._driven_actuators()
         for k in driven:
@@ -181,14 +181,17 @@ class Mjcf(Robot):
         one cannot follow it."""
         model = self.model
         can_follow = _can_follow_clock(model)
-        cure = "make it <position> or <velocity>"
+        cure = "use <position> or <velocity>"
         if self.actuators is None:
             driven = np.flatnonzero(can_follow)
             require(
                 len(driven) > 0,
                 "no actuator can follow the clock",
                 where=self.mjcf,
-                instead=f"{cure}, or actuators = [] for the first keyframe's controls",
+                instead=(
+                    f"{cure}, or actuators = [] to hold the controls of the first "
+                    "keyframe"
+                ),
             )
             return driven
 
@@ -210,8 +213,8 @@ class Mjcf(Robot):
         name = formatted(name or f"number {actuator + 1}")
         require(
             not self.model.actuator_ctrllimited[actuator],
-            f"{self.mjcf}: the actuator {name} has a ctrlrange: a leg that turns round "
-            "needs none; drop it",
+            f"{self.mjcf}: the actuator {name} has a ctrlrange, which a leg that "
+            "turns round does not need; remove it",
         )
 
     def surfaces(self, elements: int) -> list[Surface]:
@@ -255,7 +258,7 @@ def require_bounded(path: Path) -> None:
     try:
         _count_parts(path, _PartCount(), [path.parent])
     except RecursionError:
-        raise Refusal("its elements are nested too deep") from None
+        raise Refusal("its elements are nested too deeply") from None
 
 
 @dataclass
@@ -274,10 +277,11 @@ def _count_parts(path: Path, count: _PartCount, folders: list[Path]) -> None:
     """Add the parts of a file and of those that it includes. folders: those of the
     files around it."""
     name = path.name
-    require(path.is_file(), f"{name} is no ordinary file")
+    require(path.is_file(), f"{name} is not an ordinary file")
     require(
         path.stat().st_size <= LARGEST_FILE and len(folders) < MOST_INCLUDES,
-        f"{name} is included too deep, or larger than {LARGEST_FILE / 1e6:.0f} MB",
+        f"{name} is included too deeply, or larger than "
+        f"{LARGEST_FILE / 1000000.0:.0f} MB",
     )
     try:
         root = ElementTree.parse(path).getroot()
@@ -345,7 +349,7 @@ def _compile_model(file: str):
     except Exception as error:
         message = " ".join(str(error).split())
         raise Refusal(
-            f"{file} is no MJCF that MuJoCo reads", because=message[:300]
+            f"{file} is not an MJCF file that MuJoCo can read", because=message[:300]
         ) from None
     _require_sound(file, model)
 
@@ -360,7 +364,7 @@ def _require_readable(file: str, path: Path) -> None:
     be read."""
     try:
         require(path.exists(), f"there is no MJCF file {file}")
-        require(path.is_file(), f"{file} is no ordinary file")
+        require(path.is_file(), f"{file} is not an ordinary file")
         require(
             path.stat().st_size <= LARGEST_FILE,
             f"{file} is larger than {LARGEST_FILE / 1e6:.0f} MB",
@@ -384,7 +388,9 @@ def _require_sound(file: str, model) -> None:
     g_x, g_y, g_z = model.opt.gravity
     is_down = g_z < 0 and abs(g_x) + abs(g_y) <= 1e-9 * abs(g_z)
     require(
-        bool(is_down), "gravity must be along -z, the ground is at z = 0", where=file
+        bool(is_down),
+        "gravity must be along -z, because the ground is at z = 0",
+        where=file,
     )
 
 

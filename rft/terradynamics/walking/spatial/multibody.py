@@ -90,7 +90,7 @@ class Multibody:
         require(
             model.na == 0,
             "the model has actuators with a state of their own",
-            instead="drop their dyntype",
+            instead="remove their dyntype",
         )
         require_passive(model)
         mujoco.set_mju_user_warning(_ignore)
@@ -208,7 +208,7 @@ class Multibody:
             bool(np.isfinite(sums).all())
             and installed.is_installed(self._row, self._bed),
             f"the time step at {begin:.4g} s cannot be solved",
-            instead="make steps shorter",
+            instead="use shorter steps",
         )
         self.update()
         self._count(before, dt)
@@ -298,9 +298,8 @@ def _remove_contacts(model: mujoco.MjModel, surfaces: Sequence[Surface]) -> None
     is_paired = in_sand[model.pair_geom1] | in_sand[model.pair_geom2]
     require(
         not is_paired.any(),
-        "a <pair> of <contact> names a geom that touches the ground, and no other "
-        "thing",
-        instead="drop it",
+        "a <pair> of <contact> names a geom that touches the groundand nothing else",
+        instead="remove it",
     )
 
 
