@@ -11,7 +11,7 @@ from importlib import import_module
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from geomech import __version__, questions
 from geomech.shell import describe, renamed, terminal
@@ -56,6 +56,23 @@ class Group(TyperGroup):
         return super().resolve_command(ctx, renamed.current(args))
 
 
+class Command(TyperCommand):
+    """A command whose help lists the options of figures apart from its own."""
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        rows: dict[str, list] = {}
+        for parameter in self.get_params(ctx):
+            row = parameter.get_help_record(ctx)
+            if row is not None:
+                heading = getattr(parameter, "rich_help_panel", None)
+                if parameter.param_type_name == "argument":
+                    heading = "Arguments"
+                rows.setdefault(heading or "Options", []).append(row)
+        for heading, lines in rows.items():
+            with formatter.section(heading):
+                formatter.write_dl(lines)
+
+
 def headings() -> dict[str, list[str]]:
     """Return the names of all commands by their headings."""
     found: dict[str, list[str]] = {}
@@ -83,7 +100,7 @@ def load_command(name: str) -> Any:
     single = typer.Typer(
         pretty_exceptions_enable=False, rich_markup_mode=None, add_completion=False
     )
-    single.command(command_word(name))(with_plugins(function(name)))
+    single.command(command_word(name), cls=Command)(with_plugins(function(name)))
     return typer.main.get_command(single)
 
 

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from geomech.core.variables import Result
-from geomech.plots.style import figure, styled
+from geomech.plots.look import font_points
+from geomech.plots.style import columns_that_fit, figure, styled
+from geomech.results.lengths import shown_lengths
 from geomech.results.scenes import scene_of
 from geomech.studies.terradynamics import walking
 
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
 
 TRIPOD_COLOURS = ("0.2", "C0")  # of the legs that move in step
 STRIP_PICTURES = 6
+NARROWEST_PICTURE = 1.6  # in
 FOLLOWED_SPAN = 2.4  # in half widths of a robot, to either side of one that is followed
 
 
@@ -27,8 +30,8 @@ def walk_figure(result: Result) -> Figure:
     t = result["t"].values
     fig, axes = figure(7.2, 4.6, 2, 2)
     lines = (
-        ("forward speed (m/s)", result["v_x"].values),
-        (r"height $z$ (m)", result["z"].values),
+        (f"forward speed ({result['v_x'].unit})", result["v_x"].values),
+        (rf"height $z$ ({result['z'].unit})", result["z"].values),
         ("pitch (degrees)", np.degrees(result["pitch"].values)),
     )
     for ax, (label, values) in zip(axes.ravel(), lines):
@@ -38,7 +41,9 @@ def walk_figure(result: Result) -> Figure:
     speed = float(result["speed"])
     axes[0, 0].axhline(speed, color="C3", lw=1.0, ls="--")
     status = str(result["status"].values)
-    axes[0, 0].set_title(f"mean {speed:.3g} m/s, {status}", color="C3")
+    axes[0, 0].set_title(
+        f"mean {speed:.3g} {result['speed'].unit}, {status}", color="C3"
+    )
     last = len(t) - 1
     walk_stage(axes[1, 1], result, np.array([last]))(last)
     return fig
@@ -50,7 +55,12 @@ def walk_strip(result: Result) -> Figure:
     t = result["t"].values
     begin = max(0.0, t[-1] - 1 / float(result["frequency"]))
     rows = rows_at(t, np.linspace(begin, t[-1], STRIP_PICTURES))
-    fig, axes = figure(2.3 * 3, 1.9 * 2, 3, 2, layout="compressed")
+    columns = columns_that_fit(2.3 * 3, 3, NARROWEST_PICTURE)
+    rows_of_pictures = -(-STRIP_PICTURES // columns)
+    size = (2.3 * columns, 1.9 * rows_of_pictures)
+    fig, axes = figure(
+        *size, columns, rows_of_pictures, "compressed", NARROWEST_PICTURE
+    )
     for ax, row in zip(axes.ravel(), rows):
         walk_stage(ax, result, np.array([row]))(row)
         ax.label_outer(remove_inner_ticks=False)
@@ -89,11 +99,11 @@ def walk_stage(
         xlim=(shown_x.min() - margin, shown_x.max() + margin),
         ylim=(-1.2 * reach, 3.2 * reach),
         aspect="equal",
-        xlabel="$x$ (m)",
-        ylabel="$z$ (m)",
+        xlabel=f"$x$ ({result['x'].unit})",
+        ylabel=f"$z$ ({result['z'].unit})",
     )
     draw_robot = robot.artist(ax)
-    title = ax.set_title("", loc="left", fontsize=8)
+    title = ax.set_title("", loc="left", fontsize=font_points(8))
 
     def update(row: int) -> None:
         draw_robot(row)
@@ -117,12 +127,14 @@ class FlatRobot:
         self.gait = scene.gait
         self.t = result["t"].values
         self.pose = np.stack([result[name].values for name in ("x", "z", "pitch")], -1)
-        self.leg = robot.leg(40).points
-        self.belly = robot.belly(8)
+        _, factor = shown_lengths(result)
+        self.leg = factor * robot.leg(40).points
+        belly = robot.belly(8)
+        self.belly = None if belly is None else factor * belly.points
         self.leg_reach = np.abs(self.leg).max()
-        self.hips = [(x, robot.hip_height) for x in robot.hips]
-        leg_ends = [abs(x) + self.leg_reach for x in robot.hips]
-        half_length = getattr(robot, "length", 0.0) / 2
+        self.hips = [(factor * x, factor * robot.hip_height) for x in robot.hips]
+        leg_ends = [abs(x) + self.leg_reach for x, _ in self.hips]
+        half_length = factor * getattr(robot, "length", 0.0) / 2
         self.half_width = max(self.leg_reach, half_length, *leg_ends)
 
     def artist(self, ax: Axes) -> Callable[[int], None]:
@@ -145,7 +157,7 @@ class FlatRobot:
                 angle = pitch + float(self.gait.angle(turns, turns))
                 line.set_data(*(rotated(self.leg, angle) + centre).T)
             if self.belly is not None:
-                box.set_data(*(rotated(self.belly.points, pitch) + place).T)
+                box.set_data(*(rotated(self.belly, pitch) + place).T)
 
         return draw
 
@@ -158,7 +170,8 @@ class SolidRobot:
     def __init__(self, result: Result):
         self.view = walking.view(scene_of(result))
         self.states = result["states"].values
-        first = self.view.triangles(self.states[0]).reshape(-1, 3)
+        _, self.factor = shown_lengths(result)
+        first = self.factor * self.view.triangles(self.states[0]).reshape(-1, 3)
         start = [float(result["x"].values[0]), 0.0]
         self.half_width = float(np.abs(first[:, [0, 1]] - start).max())
         self.leg_reach = max(float(np.ptp(first[:, 2])), self.half_width / 4) / 2
@@ -174,7 +187,7 @@ class SolidRobot:
         polygons = ax.add_collection(PolyCollection([], lw=1.0))
 
         def draw(row: int) -> None:
-            triangles = self.view.triangles(self.states[row])
+            triangles = self.factor * self.view.triangles(self.states[row])
             # Farther triangles are drawn first.
             order = np.argsort(-triangles[..., 1].mean(1), kind="stable")
             polygons.set_verts(triangles[order][..., [0, 2]])
