@@ -2,7 +2,8 @@
 
 On any page, ```LANGUAGE FILE is a file of that name. The commands of a block
 ```console, `$ ` before each, are run in the folder of the page's files, after its
-programs, and followed by what they print. On a page of the gallery the commands of a
+programs, and followed by what they print; a picture /generated/pages/FILE is one that
+they draw there. On a page of the gallery the commands of a
 block ```sh and the programs of a block ```python are run, the picture of the command is
 shown, and the scene is added.
 """
@@ -11,6 +12,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -20,6 +22,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 BLOCK = re.compile(r"(?ms)^```(\w+)(?: ([\w.-]+))?\n(.*?)^```$")
 GALLERY = ROOT / ".docs" / "gallery"
+DRAWN = ROOT / ".docs" / "generated" / "pages"
 PICTURES = ROOT / ".docs" / "generated" / "gallery"
 SHELL = f'geomech() {{ "{sys.executable}" -m geomech "$@"; }}\n'
 LONGEST = 40  # lines of output that a page shows
@@ -44,7 +47,11 @@ def with_output(text: str) -> str:
     if "```console\n" not in text:
         return text
     with tempfile.TemporaryDirectory() as folder:
-        return BLOCK.sub(lambda block: _shown(block, Path(folder)), text)
+        page = BLOCK.sub(lambda block: _shown(block, Path(folder)), text)
+        for name in re.findall(r"\]\(/generated/pages/([\w.-]+)\)", text):
+            DRAWN.mkdir(parents=True, exist_ok=True)
+            shutil.copy(Path(folder) / name, DRAWN / name)
+        return page
 
 
 def _shown(block: re.Match, folder: Path) -> str:
@@ -58,7 +65,8 @@ def _shown(block: re.Match, folder: Path) -> str:
     if language != "console":
         return block[0]
     lines = []
-    for line in code.splitlines():
+    # A command may go on in the next line.
+    for line in re.split(r"(?<!\\)\n", code.rstrip("\n")):
         lines.append(line)
         if line.startswith("$ geomech "):
             printed = run(line[2:], folder).rstrip().splitlines()

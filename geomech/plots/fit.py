@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from geomech.plots.look import Look
 
-ROUNDS = 5  # of measuring and changing, at most
+ROUNDS = 7  # of measuring and changing, at most
 GAP = 4.0  # points between texts of neighbours
 LEAST_HEIGHT = 1.15  # in, of a panel
 TALLEST_MAP = 1.3  # height over width of a map that the figure's height is made for
@@ -47,10 +47,12 @@ def fit(fig: Figure, look: Look) -> None:
             *(_fold(fig, ax) for ax in fig.axes),
             *(_fold_outer(fig, legend) for legend in fig.legends),
         ]
-        if look.inches is not None:
-            changed.append(_set_height(fig))
-        if not any(changed):
+        if any(changed):
+            continue
+        if look.inches is None or not _set_height(fig):
             break
+    else:
+        _lay_out(fig)
     _keep_inside(fig)
 
 
@@ -407,7 +409,6 @@ def _keep_inside(fig: Figure) -> None:
     x, y, w, h = engine.get().get("rect", (0.0, 0.0, 1.0, 1.0))
     left, bottom, right, top = x, y, x + w, y + h
     for _ in range(3):
-        _lay_out(fig)
         width, height = fig.get_size_inches()
         box = fig.get_tightbbox()
         over = (-box.x0, -box.y0, box.x1 - width, box.y1 - height)
@@ -418,3 +419,4 @@ def _keep_inside(fig: Figure) -> None:
         right -= max(0.0, over[2] + 0.01) / width
         top -= max(0.0, over[3] + 0.01) / height
         engine.set(rect=(left, bottom, right - left, top - bottom))
+        _lay_out(fig)

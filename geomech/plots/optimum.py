@@ -97,7 +97,7 @@ def stretched_optimum(
         gained_component(result),
         ax=ax,
         labels=shape_labels(system),
-        unit=result["stretched_shape"].unit,
+        unit=result["stretched_shape"].units,
         clim=clim,
     )
     percent = 100 * plane.rms

@@ -14,7 +14,7 @@ from geomech.core.summary import listed
 from geomech.core.variables import Result
 from geomech.mathematics.geometry.representations.field import UNKNOWN_UNIT
 from geomech.mathematics.tiers import TIERS, Tier
-from geomech.plots.look import font_points
+from geomech.plots.look import current, font_points
 from geomech.plots.style import axes_of, figure, shared_legend, styled
 from geomech.scenes.data.measurements import converted, points_of, units_of
 from geomech.studies.displacement.variables import QUANTITIES, pose_quantities
@@ -278,7 +278,8 @@ def displacement_figure(
         title = printable(name)
         if "note" in table.attributes:
             title = f"{title} (not in the scene)"
-        row[0].set_title(title, loc="left")
+        if len(tables) > 1 or current().inches is None:  # a page has its caption
+            row[0].set_title(title, loc="left")
         frequency = table.attributes.get("frequency")
         if frequency and panels[-1] == "net_distance":
             _draw_speed_axis(row[-1], frequency, table["x"].units)

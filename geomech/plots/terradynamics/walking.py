@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 TRIPOD_COLOURS = ("0.2", "C0")  # of the legs that move in step
 STRIP_PICTURES = 6
+MEASURED_ROWS = 60  # of a film, at which the extent of a robot is taken
 NARROWEST_PICTURE = 1.6  # in
 FOLLOWED_SPAN = 2.4  # in half widths of a robot, to either side of one that is followed
 
@@ -94,10 +95,19 @@ def walk_stage(
     if follow:
         shown_x = shown_x[:1]
         margin = FOLLOWED_SPAN * robot.half_width
-    ax.axhspan(-3 * reach, 0.0, color="peru", alpha=0.35, lw=0)
+    left, right = shown_x.min() - margin, shown_x.max() + margin
+    bottom, top = -1.2 * reach, 3.2 * reach
+    # A robot that stands high, pitches or sinks needs more than that.
+    low, high = robot_limits(robot, rows)
+    if not follow:
+        left = min(left, low[0] - 0.1 * reach)
+        right = max(right, high[0] + 0.1 * reach)
+    bottom = min(bottom, low[1] - 0.1 * reach)
+    top = max(top, high[1] + 0.1 * reach)
+    ax.axhspan(min(-3 * reach, bottom), 0.0, color="peru", alpha=0.35, lw=0)
     ax.set(
-        xlim=(shown_x.min() - margin, shown_x.max() + margin),
-        ylim=(-1.2 * reach, 3.2 * reach),
+        xlim=(left, right),
+        ylim=(bottom, top),
         aspect="equal",
         xlabel=f"$x$ ({result['x'].unit})",
         ylabel=f"$z$ ({result['z'].unit})",
@@ -112,6 +122,16 @@ def walk_stage(
             ax.set_xlim(x[row] - margin, x[row] + margin)
 
     return update
+
+
+def robot_limits(
+    robot: FlatRobot | SolidRobot, rows: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest and highest (x, z) of a robot at some rows of its walk, at most
+    MEASURED_ROWS of them."""
+    step = -(-len(rows) // MEASURED_ROWS)
+    points = np.concatenate([robot.points(row) for row in rows[::step]])
+    return points.min(0), points.max(0)
 
 
 class FlatRobot:
@@ -137,27 +157,42 @@ class FlatRobot:
         half_length = factor * getattr(robot, "length", 0.0) / 2
         self.half_width = max(self.leg_reach, half_length, *leg_ends)
 
+    @property
+    def legs(self) -> list[tuple[int, float]]:
+        """The hip and the phase of every leg."""
+        phases = self.robot.hip_phases
+        return [(hip, phase) for hip in range(len(self.hips)) for phase in phases]
+
+    def outlines(self, row: int) -> list[np.ndarray]:
+        """Return the outlines (N, 2) of the legs and, if it has one, of the body."""
+        place = self.pose[row, :2]
+        pitch = self.pose[row, 2]
+        found = []
+        for hip, phase in self.legs:
+            offset = (hip * self.robot.hip_phases[-1] + phase) % 1.0
+            turns = self.gait.frequency * self.t[row] + offset
+            centre = rotated(np.array([self.hips[hip]]), pitch) + place
+            angle = pitch + float(self.gait.angle(turns, turns))
+            found.append(rotated(self.leg, angle) + centre)
+        if self.belly is not None:
+            found.append(rotated(self.belly, pitch) + place)
+        return found
+
+    def points(self, row: int) -> np.ndarray:
+        """Return points (N, 2) of its outlines."""
+        return np.concatenate(self.outlines(row))
+
     def artist(self, ax: Axes) -> Callable[[int], None]:
         """Return a function that draws the robot at a row of its walk."""
-        phases = self.robot.hip_phases
-        legs = [(hip, phase) for hip in range(len(self.hips)) for phase in phases]
         lines = []
-        for hip, phase in legs:
+        for hip, phase in self.legs:
             colour = TRIPOD_COLOURS[int((hip + 2 * phase) % 2)]
             lines += ax.plot([], [], color=colour, lw=1.2)
-        (box,) = ax.plot([], [], color="black", lw=1.2)
+        lines += ax.plot([], [], color="black", lw=1.2)
 
         def draw(row: int) -> None:
-            place = self.pose[row, :2]
-            pitch = self.pose[row, 2]
-            for line, (hip, phase) in zip(lines, legs):
-                offset = (hip * phases[-1] + phase) % 1.0
-                turns = self.gait.frequency * self.t[row] + offset
-                centre = rotated(np.array([self.hips[hip]]), pitch) + place
-                angle = pitch + float(self.gait.angle(turns, turns))
-                line.set_data(*(rotated(self.leg, angle) + centre).T)
-            if self.belly is not None:
-                box.set_data(*(rotated(self.belly, pitch) + place).T)
+            for line, outline in zip(lines, self.outlines(row)):
+                line.set_data(*outline.T)
 
         return draw
 
@@ -175,6 +210,11 @@ class SolidRobot:
         start = [float(result["x"].values[0]), 0.0]
         self.half_width = float(np.abs(first[:, [0, 1]] - start).max())
         self.leg_reach = max(float(np.ptp(first[:, 2])), self.half_width / 4) / 2
+
+    def points(self, row: int) -> np.ndarray:
+        """Return the corners (N, 2) of its triangles from the side."""
+        triangles = self.factor * self.view.triangles(self.states[row])
+        return triangles[..., [0, 2]].reshape(-1, 2)
 
     def artist(self, ax: Axes) -> Callable[[int], None]:
         """Return a function that draws the robot at a row of its walk."""

@@ -52,6 +52,8 @@ def look_options(question: Any) -> Declared:
 
 def own_options(question: Any) -> list[str]:
     """Return the keywords that the picture of a question alone takes."""
+    if question.draw is None:
+        return []
     parameters = inspect.signature(question.draw).parameters.values()
     return [p.name for p in parameters if p.kind is p.KEYWORD_ONLY]
 

@@ -260,7 +260,7 @@ class Ccf(Question):
             )
         options.update(gaits=[scene.gait], error=error)
         if stretch:
-            unit = result["stretched_shape"].unit
+            unit = result["stretched_shape"].units
             plane = stretch_of(result)
             return plots.stretched_figure(ccf, plane, unit=unit, **options)
         if both:
