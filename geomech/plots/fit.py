@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 ROUNDS = 7  # of measuring and changing, at most
 GAP = 4.0  # points between texts of neighbours
 LEAST_HEIGHT = 1.15  # in, of a panel
+MOST_ROWS = 4  # of a figure of maps and curves that grows for its maps
 TALLEST_MAP = 1.3  # height over width of a map that the figure's height is made for
 SLACK = 0.08  # in, of empty margins that stay
 SMALLEST = 0.8  # of the size of a text that cannot be wrapped
@@ -382,7 +383,7 @@ def _set_height(fig: Figure) -> bool:
         fig.set_figheight(height + rows * (LEAST_HEIGHT - shortest))
         return True
     if np.isfinite(shortest):
-        if missing > 0.2 * width:
+        if missing > 0.2 * width and rows <= MOST_ROWS:
             fig.set_figheight(height + 0.8 * rows * missing)
             return True
         return False

@@ -12,7 +12,6 @@ import pytest
 from artists import only
 from commands import geomech as command
 from matplotlib.collections import QuadMesh
-from tabled import of_table
 
 import geomech
 from geomech import plots
@@ -73,8 +72,8 @@ def overlapping(figure):
 
 @pytest.mark.parametrize("name", ONE_OF_A_KIND)
 def test_a_figure_fits_the_column_of_a_journal(name):
-    ((_, result, options),) = golden.pictured(name)
-    figure = result.plot(**options, width=COLUMN)
+    for _, result, options in golden.pictured(name):
+        figure = result.plot(**options, width=COLUMN)
     figure.draw_without_rendering()
     assert figure.get_figwidth() == 3.4
     box = figure.get_tightbbox()
