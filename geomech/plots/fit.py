@@ -403,13 +403,16 @@ def _set_height(fig: Figure) -> bool:
 
 
 def _keep_inside(fig: Figure) -> None:
-    """Lay panels out in a part of the canvas if something would leave it."""
+    """Lay panels out in a part of the canvas if something would leave it.
+
+    Each layout may choose other ticks, so that it is judged after one more."""
     engine = fig.get_layout_engine()
     if engine is None:
         return
     x, y, w, h = engine.get().get("rect", (0.0, 0.0, 1.0, 1.0))
     left, bottom, right, top = x, y, x + w, y + h
-    for _ in range(3):
+    for _ in range(4):
+        _lay_out(fig)
         width, height = fig.get_size_inches()
         box = fig.get_tightbbox()
         over = (-box.x0, -box.y0, box.x1 - width, box.y1 - height)
@@ -420,4 +423,3 @@ def _keep_inside(fig: Figure) -> None:
         right -= max(0.0, over[2] + 0.01) / width
         top -= max(0.0, over[3] + 0.01) / height
         engine.set(rect=(left, bottom, right - left, top - bottom))
-        _lay_out(fig)
