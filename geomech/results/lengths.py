@@ -77,7 +77,7 @@ def in_lengths(result: Result, unit: str) -> Result:
     >>> import geomech
     >>> from geomech.results.lengths import in_lengths
     >>> chain = geomech.bodies.Chain((1, 1, 1), length=0.15)
-    >>> circle = geomech.mathematics.gaits.Circle(1.0)
+    >>> circle = geomech.gaits.Circle(1.0)
     >>> study = geomech.study(geomech.media.Viscous(2.0), chain, circle)
     >>> moved = in_lengths(study.displacement(tiers="direct"), "cm")
     >>> moved["x"].unit, moved["x"].values.round(2).tolist()

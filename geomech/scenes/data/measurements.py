@@ -170,7 +170,10 @@ def _scales(
             )
         with located(place):
             scales[name] = _scale(name, unit, units[name], owner)
-    if "amplitude" not in scales or not {"value", *QUANTITIES} & {*scales}:
+    measured = {"value", *QUANTITIES} & {*scales}
+    errors = {name for name in scales if name.endswith("error")}
+    without = errors - {"error" if x == "value" else f"{x}_error" for x in measured}
+    if "amplitude" not in scales or not measured or without:
         header = ",".join(words)
         raise Refusal(f"the header must be {HEADER}", value=header, where=place)
     return scales
