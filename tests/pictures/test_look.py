@@ -101,7 +101,7 @@ def test_letters_stay_text(moved, tmp_path):
     pdf = (tmp_path / "a.pdf").read_bytes()
     assert b"/Type3" not in pdf and b"STIXGeneral" in pdf
     svg = (tmp_path / "a.svg").read_text()
-    assert "amplitude</text>" in svg and "STIXGeneral" in svg
+    assert "radius of the circle (rad)</text>" in svg and "STIXGeneral" in svg
     # As matplotlib itself writes it.
     figure.savefig(tmp_path / "b.pdf")
     assert b"/Type3" not in (tmp_path / "b.pdf").read_bytes()
