@@ -28,6 +28,8 @@ def _command(command) -> str:
         for p in command.params
         if p.param_type_name == "option" and not p.hidden and "--help" not in p.opts
     ]
+    shared = [p for p in options if p.rich_help_panel]
+    options = [p for p in options if not p.rich_help_panel]
     usage = " ".join(
         [
             "geomech",
@@ -42,6 +44,9 @@ def _command(command) -> str:
         for p in arguments + options
     ]
     table = "| argument or option | meaning |\n|---|---|\n" + "\n".join(rows)
+    if shared:
+        names = ", ".join(f"`{p.opts[0]}`" for p in shared)
+        table += f"\n\n[Of figures](../how-to/figures.md#3-draw): {names}."
     return f"### `{command.name}`\n\n{text}\n\n```text\n{usage}\n```\n\n{table}"
 
 

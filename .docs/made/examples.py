@@ -2,16 +2,18 @@
 
 On any page, a block ```LANGUAGE FILE is a file of that name. The commands of a block
 ```console, each after `$ `, are run in the folder of the page's files, after the
-programs of the page, and are followed by what they print. An empty block ```printed
-becomes what the last program ```python before it prints. On a page of the gallery the
-commands of a block ```sh and the programs of a block ```python are run, the picture of
-the command is shown, and the scene is added.
+programs of the page, and are followed by what they print; a picture
+/generated/pages/FILE is one that they draw there. An empty block ```printed becomes
+what the last program ```python before it prints. On a page of the gallery the commands
+of a block ```sh and the programs of a block ```python are run, the picture of the
+command is shown, and the scene is added.
 """
 
 from __future__ import annotations
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -21,6 +23,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 BLOCK = re.compile(r"(?ms)^```(\w+)(?: ([\w.-]+))?\n(.*?)^```$")
 GALLERY = ROOT / ".docs" / "gallery"
+DRAWN = ROOT / ".docs" / "generated" / "pages"
 PICTURES = ROOT / ".docs" / "generated" / "gallery"
 SHELL = f'geomech() {{ "{sys.executable}" -m geomech "$@"; }}\n'
 LONGEST = 40  # lines of output that a page shows
@@ -59,6 +62,9 @@ def with_output(text: str) -> str:
                 shown = _shown(block, folder)
             parts += [text[end : block.start()], shown]
             end = block.end()
+        for picture in re.findall(r"\]\(/generated/pages/([\w.-]+)\)", text):
+            DRAWN.mkdir(parents=True, exist_ok=True)
+            shutil.copy(folder / picture, DRAWN / picture)
     return "".join([*parts, text[end:]])
 
 
@@ -71,7 +77,8 @@ def _shown(block: re.Match, folder: Path) -> str:
     if language != "console":
         return block[0]
     lines = []
-    for line in code.splitlines():
+    # A command may go on in the next line.
+    for line in re.split(r"(?<!\\)\n", code.rstrip("\n")):
         lines.append(line)
         if line.startswith("$ geomech "):
             printed = run(line[2:], folder).rstrip().splitlines()

@@ -241,7 +241,25 @@ class Result(Mapping[str, Variable]):
         implementation("Result.save")(self, Path(path), **options)
 
     def plot(self, **options: Any) -> Any:
-        """Draw the result; return the Figure. options: those of the kind's picture."""
+        """Draw the result; return the Figure. Another option than these is refused.
+
+        Parameters
+        ----------
+        width : str
+            Width on the page, such as "3.4in", "86mm" or "246pt" (of TeX).
+        unit : str
+            Unit of lengths, "m", "cm", "mm" or "BL", in pictures that have lengths.
+        font : str
+            Font and size in points, as "Arial,8", "Arial" or "8".
+        style : str or list of str
+            Style of matplotlib, a FILE.mplstyle or a name.
+        cmap : str
+            Colour map of matplotlib or cmcrameri, in pictures with maps.
+        legend : str
+            "outside" (one above all panels), "inside" or "none".
+        **options
+            Those of the kind's picture, which the refusal of a wrong one lists.
+        """
         return implementation("Result.plot")(self, **options)
 
 

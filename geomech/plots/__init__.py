@@ -32,6 +32,7 @@ from geomech.plots.forces import (
     stacked_by_phase,
     stacked_by_place,
 )
+from geomech.plots.look import Look, using
 from geomech.plots.maps import (
     COMPONENTS,
     FINEST,
@@ -95,6 +96,7 @@ __all__ = [
     "RINGS",
     "SETTING_MARKER",
     "STYLE",
+    "Look",
     "accuracy_figure",
     "ccf_contours",
     "ccf_figure",
@@ -147,6 +149,7 @@ __all__ = [
     "styled",
     "sweep_figure",
     "unknown",
+    "using",
     "vector_field",
     "walk_figure",
     "walk_strip",

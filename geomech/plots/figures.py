@@ -15,6 +15,7 @@ from geomech.mathematics.geometry.metric import Finsler, Metric
 from geomech.mathematics.geometry.representations.field import Field
 from geomech.mathematics.geometry.representations.plane import Plane, ProjectedGait
 from geomech.mathematics.geometry.two_form import TwoForm
+from geomech.plots.look import current, font_points
 from geomech.plots.maps import (
     ANGLES,
     PHASES,
@@ -30,13 +31,21 @@ from geomech.plots.maps import (
     row_name,
     scale_limit,
 )
-from geomech.plots.style import blank, figure, quantity, styled, with_minus_signs
+from geomech.plots.style import (
+    columns_that_fit,
+    figure,
+    panels,
+    quantity,
+    styled,
+    with_minus_signs,
+)
 from geomech.plots.styles import CCF_STYLES, CONNECTION_STYLES
 from geomech.results.fields import Slice
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+ROW_NAME = -0.72  # in, of the name of a row from its first panel, in a given width
 SHADOW = "dashed: the gait, seen along the joints that are held here"
 
 
@@ -170,7 +179,7 @@ def pairs_figure(
         if fixed:
             angles = [f"{quantity(labels[k][0])} = {at[k]:g}" for k in fixed]
             title += f"; {with_minus_signs(', '.join(angles))}"
-        ax.set_title(title, fontsize=8)
+        ax.set_title(title, fontsize=font_points(8))
     for ax in axes.ravel()[len(fields) :]:
         ax.set_axis_off()
     return fig
@@ -345,9 +354,9 @@ def _draw_rows(
 
 def _surface_panels(columns: int, rows: int) -> tuple[Any, Any]:
     """Return (Figure, 3-D Axes) of surfaces."""
-    fig = blank(1.0 + 3.6 * columns, 3.6 * rows)
-    solid = {"projection": "3d"}
-    axes = fig.subplots(rows, columns, squeeze=False, subplot_kw=solid)
+    width = 1.0 + 3.6 * columns
+    fit = columns_that_fit(width, columns)
+    fig, axes = panels(width, 3.6 * rows, columns, rows, fit, {"projection": "3d"})
     fig.get_layout_engine().set(w_pad=0.25)
     return fig, axes
 
@@ -411,16 +420,26 @@ def _merge_legends(fig: Figure, axes: Any) -> None:
 
 def _name_rows(axes: Any, names: Sequence[str]) -> None:
     """Write the name of each row at its left."""
+    from matplotlib.transforms import ScaledTranslation
+
     for row, name in zip(axes, names):
         ax = row[0]
+        place = -0.33
+        transform = ax.transAxes
+        if current().inches is not None:
+            # Left of the label, however wide the panel is.
+            place = 0.0
+            inches = ScaledTranslation(ROW_NAME, 0, ax.figure.dpi_scale_trans)
+            transform = transform + inches
         look = {
-            "transform": ax.transAxes,
+            "transform": transform,
             "rotation": 90,
             "ha": "center",
             "va": "center",
-            "fontsize": 10,
+            "fontsize": font_points(10),
         }
         if hasattr(ax, "text2D"):
+            look["transform"] = ax.transAxes
             ax.text2D(0.03, 0.5, name, in_layout=False, **look)
         else:
-            ax.text(-0.33, 0.5, name, in_layout=True, **look)
+            ax.text(place, 0.5, name, in_layout=True, **look)

@@ -16,6 +16,7 @@ import numpy as np
 from geomech import plots
 from geomech.core.variables import Result
 from geomech.io.files import atomic_file
+from geomech.plots.look import font_points
 from geomech.plots.terradynamics.walking import rows_at, walk_stage
 from geomech.results.scenes import scene_of
 from geomech.runs.cost import Cost
@@ -229,7 +230,7 @@ def walk_canvas(result: Result, rows: np.ndarray, caption: str, follow: bool) ->
     low, high = ax.get_ylim()
     height = (WALK_WIDTH - LABELS) * (high - low) / (right - left) + LABELS
     fig.set_figheight(float(np.clip(height, *WALK_HEIGHTS)))
-    ax.set_title(caption, loc="right", fontsize=8, color="0.3")
+    ax.set_title(caption, loc="right", fontsize=font_points(8), color="0.3")
     fig.set_dpi(DPI)
     return FigureCanvasAgg(fig), update
 

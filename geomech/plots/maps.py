@@ -14,6 +14,7 @@ from geomech.mathematics.gaits import Gait
 from geomech.mathematics.geometry.connection import Connection
 from geomech.mathematics.geometry.metric import Finsler, Metric
 from geomech.mathematics.geometry.representations.field import Field
+from geomech.plots.look import colours, font_points
 from geomech.plots.style import axes_of, figure, quantity, styled
 
 if TYPE_CHECKING:
@@ -131,10 +132,14 @@ def vector_field(
 
 
 def arrow_colours() -> ListedColormap:
-    """Return a colour map, light to dark, whose ends are both visible on white."""
+    """Return a colour map, light to dark, whose ends are both visible on white, or the
+    one that the look asks for."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
 
+    asked = colours(None)
+    if asked is not None:
+        return asked
     return ListedColormap(colormaps["viridis"](np.linspace(0.86, 0.0, 256)), "arrows")
 
 
@@ -286,7 +291,7 @@ def draw_colours(
         x,
         y,
         values,
-        cmap=cm.vik,
+        cmap=colours(cm.vik),
         vmin=-top,
         vmax=top,
         shading=shading,
@@ -297,7 +302,7 @@ def draw_colours(
 def _note_gait_outside(ax: Axes) -> None:
     box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
     text = "gait leaves the field"
-    ax.text(0.02, 0.02, text, transform=ax.transAxes, fontsize=7, bbox=box)
+    ax.text(0.02, 0.02, text, transform=ax.transAxes, fontsize=font_points(7), bbox=box)
 
 
 def colorbar_extend(values: np.ndarray, top: float) -> str:
@@ -549,7 +554,7 @@ def note_zero_components(
     if absent and not components:
         lines.append(f"{' and '.join(absent)}: zero everywhere")
     if lines:
-        fig.supxlabel("; ".join(lines), fontsize=8, color="0.3")
+        fig.supxlabel("; ".join(lines), fontsize=font_points(8), color="0.3")
 
 
 # Gaits

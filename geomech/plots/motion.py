@@ -4,13 +4,15 @@ panels and as a strip of pictures for a page."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from geomech.core.variables import Result
 from geomech.mathematics.geometry.representations.field import Field
-from geomech.mathematics.systems.base import body_size, length_unit, shape_labels
+from geomech.mathematics.systems.base import body_size, shape_labels
+from geomech.plots.look import font_points
 from geomech.plots.maps import (
     ccf_map,
     draw_colours,
@@ -18,8 +20,9 @@ from geomech.plots.maps import (
     has_component,
     shape_space,
 )
-from geomech.plots.style import blank, figure, quantity, styled
+from geomech.plots.style import blank, columns_that_fit, figure, quantity, styled
 from geomech.results.fields import field_of
+from geomech.results.lengths import shown_lengths
 from geomech.results.scenes import scene_of
 from geomech.studies.displacement.variables import poses
 from geomech.studies.maps.fields import angle_names
@@ -34,6 +37,8 @@ HEAD = "#d1495b"  # colour of the head, its track and the present shape
 LINES = 8  # shape variables that are drawn as curves; more as a map along the body
 MARKED_LINKS = 12  # of the longest chain whose joints are marked
 STRIP_PICTURES = 6
+STRIP_WIDTH = 7.2  # in
+HIGHEST_STRIP = 8.0  # in
 MAP_HEIGHT = 2.4  # in, with labels
 MARGIN = 0.06  # of the larger side, around everything that moves
 
@@ -41,41 +46,66 @@ MARGIN = 0.06  # of the larger side, around everything that moves
 Update = Callable[[int], tuple]
 
 
+@dataclass(frozen=True, eq=False)
+class ShownMotion(Motion):
+    """A motion whose lengths are in the unit of a picture.
+
+    factor: of that unit to the scene's."""
+
+    unit: str
+    factor: float
+
+    @property
+    def size(self) -> float:
+        """The length of the body."""
+        return self.factor * body_size(self.scene.system)
+
+    def points(self, rows: Any = slice(None)) -> np.ndarray | None:
+        """Return ends of the links as `Motion.points` does, in the unit."""
+        pose = self.pose / [self.factor, self.factor, 1.0]
+        points = replace(self, pose=pose, factor=1.0).own_points(rows)
+        if points is None:
+            return None
+        return self.factor * points
+
+    def own_points(self, rows: Any) -> np.ndarray | None:
+        return super().points(rows)
+
+
 # The world
 
 
-def world_limits(motion: Motion, rows: Any) -> tuple[np.ndarray, np.ndarray]:
+def world_limits(motion: ShownMotion, rows: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return the lowest and highest (x, y) of the track and of the body at these rows,
     with a margin."""
     points = [motion.pose[:, :2], _bodies(motion, rows).reshape(-1, 2)]
     low = np.concatenate(points).min(0)
     high = np.concatenate(points).max(0)
-    margin = MARGIN * max(*(high - low), 1e-9 * body_size(motion.scene.system))
+    margin = MARGIN * max(*(high - low), 1e-9 * motion.size)
     return low - margin, high + margin
 
 
-def _bodies(motion: Motion, rows: Any) -> np.ndarray:
+def _bodies(motion: ShownMotion, rows: Any) -> np.ndarray:
     """Return the ends of the links (rows, points, 2), or tail and head of an arrow for
     a system without a body."""
     points = motion.points(rows)
     if points is not None:
         return points
     x, y, theta = motion.pose[rows].T[..., None]
-    along = body_size(motion.scene.system) * np.array([-0.5, 0.5])
+    along = motion.size * np.array([-0.5, 0.5])
     return np.stack([x + np.cos(theta) * along, y + np.sin(theta) * along], -1)
 
 
-def draw_world(ax: Axes, motion: Motion, rows: Any, limits: Any = None) -> Update:
+def draw_world(ax: Axes, motion: ShownMotion, rows: Any, limits: Any = None) -> Update:
     """Draw the track of the frame's origin to the scale of the body; return a function
     that draws the body at a row and returns the artists that it moved.
 
     rows: of all pictures, which fit into the axes. limits: of the axes,
     as from `world_limits`."""
     low, high = limits or world_limits(motion, rows)
-    unit = length_unit(motion.scene.system)
     ax.set(
-        xlabel=f"x ({unit})",
-        ylabel=f"y ({unit})",
+        xlabel=f"x ({motion.unit})",
+        ylabel=f"y ({motion.unit})",
         aspect="equal",
         xlim=(low[0], high[0]),
         ylim=(low[1], high[1]),
@@ -97,7 +127,7 @@ def draw_world(ax: Axes, motion: Motion, rows: Any, limits: Any = None) -> Updat
     return update
 
 
-def _has_few_links(motion: Motion) -> bool:
+def _has_few_links(motion: ShownMotion) -> bool:
     """Return whether the body is a chain of few enough links to mark its joints."""
     points = motion.points(slice(0, 1))
     return points is not None and points.shape[-2] <= MARKED_LINKS + 1
@@ -107,7 +137,10 @@ def _has_few_links(motion: Motion) -> bool:
 
 
 def draw_shapes(
-    ax: Axes, motion: Motion, field: Field | None = None, error: Field | None = None
+    ax: Axes,
+    motion: ShownMotion,
+    field: Field | None = None,
+    error: Field | None = None,
 ) -> Update:
     """Draw the gait among all shapes; return a function that marks the shape at a row
     and returns the artists that it moved.
@@ -143,7 +176,7 @@ def draw_shapes(
     return move_line
 
 
-def _draw_ccf(ax: Axes, motion: Motion, field: Field, error: Field | None) -> None:
+def _draw_ccf(ax: Axes, motion: ShownMotion, field: Field, error: Field | None) -> None:
     """Draw the map of the CCF with the gait on it."""
     present = [k for k in range(3) if has_component(field, k)]
     component = present[0] if present else 0
@@ -152,7 +185,7 @@ def _draw_ccf(ax: Axes, motion: Motion, field: Field, error: Field | None) -> No
     ccf_map(field, component, [gait], ax=ax, error=error, labels=labels)
 
 
-def _draw_plane(ax: Axes, motion: Motion) -> None:
+def _draw_plane(ax: Axes, motion: ShownMotion) -> None:
     """Draw the gait on the bare plane of two shape variables."""
     draw_gait(motion.scene.gait, ax)
     low = motion.alpha.min(0)
@@ -162,7 +195,7 @@ def _draw_plane(ax: Axes, motion: Motion) -> None:
     shape_space(ax, axes, shape_labels(motion.scene.system))
 
 
-def _draw_cycle(ax: Axes, motion: Motion, turns: np.ndarray) -> None:
+def _draw_cycle(ax: Axes, motion: ShownMotion, turns: np.ndarray) -> None:
     """Draw the shape variables over one cycle. turns: phase in cycles, at each row."""
     labels = shape_labels(motion.scene.system)
     first = turns <= 1 + 1e-9
@@ -176,7 +209,7 @@ def _draw_cycle(ax: Axes, motion: Motion, turns: np.ndarray) -> None:
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=4)
 
 
-def _draw_bends(ax: Axes, motion: Motion, turns: np.ndarray) -> None:
+def _draw_bends(ax: Axes, motion: ShownMotion, turns: np.ndarray) -> None:
     """Draw a map over phase and place along the body: the curvature, which is the angle
     between elements over the distance of their centres, or the bare angles where there
     is no chain of elements."""
@@ -188,7 +221,7 @@ def _draw_bends(ax: Axes, motion: Motion, turns: np.ndarray) -> None:
         centre_distances = (lengths[1:] + lengths[:-1]) / 2
         values = values / centre_distances[:, None]
         place = np.cumsum(lengths[:-1]) / lengths.sum()
-        name = f"curvature (rad/{length_unit(motion.scene.system)})"
+        name = f"curvature (rad/{motion.unit})"
     else:
         place = np.arange(1, joints + 1) / (joints + 1)
         name = "angle between elements (rad)"
@@ -201,20 +234,22 @@ def _draw_bends(ax: Axes, motion: Motion, turns: np.ndarray) -> None:
 # Films and strips
 
 
-def time_text(motion: Motion, row: int) -> str:
+def time_text(motion: ShownMotion, row: int) -> str:
     """Return the time at a row, or its cycle where the gait has no frequency."""
     if motion.time is not None:
         return f"t = {motion.time[row]:.3g} s"
     return f"cycle {motion.phase[row] / (2 * np.pi):.2f}"
 
 
-def motion_of(result: Result) -> Motion:
+def motion_of(result: Result) -> ShownMotion:
     """Return the motion of a scene from its result."""
     scene = scene_of(result)
     names = angle_names(range(scene.system.joints))
     alpha = np.stack([result[name].values for name in names], -1)
     frequency = result.attributes.get("frequency")
-    return Motion(scene, result["phase"].values, alpha, poses(result), frequency)
+    unit, factor = shown_lengths(result)
+    phase = result["phase"].values
+    return ShownMotion(scene, phase, alpha, poses(result), frequency, unit, factor)
 
 
 def ccf_of(result: Result) -> tuple[Field | None, Field | None]:
@@ -270,7 +305,7 @@ def filmstrip(result: Result, pictures: int = STRIP_PICTURES) -> Figure:
         ax = axes[k]
         draw_world(ax, motion, rows, limits)(row)
         title = rf"$\bf{{{k + 1}}}$  {time_text(motion, row)}"
-        ax.set_title(title, loc="left", fontsize=8)
+        ax.set_title(title, loc="left", fontsize=font_points(8))
         ax.label_outer()
     draw_shapes(panel, motion, *ccf_of(result))
     if motion.scene.system.joints == 2:
@@ -290,19 +325,33 @@ def _strip_panels(
     columns = min(pictures, max(1, round(1.2 * np.sqrt(aspect * pictures))))
     lines = -(-pictures // columns)
     strip_height = lines * (aspect * (3.9 / columns - 0.15) + 0.3) + 0.45
-    fig_height = float(np.clip(strip_height, MAP_HEIGHT, 8.0))
-    fig = blank(7.2, fig_height)
+    if columns_that_fit(STRIP_WIDTH, 2) == 1:
+        strip_height = min(strip_height, HIGHEST_STRIP)
+        fig = blank(STRIP_WIDTH, strip_height + MAP_HEIGHT)
+        heights = [strip_height, MAP_HEIGHT]
+        strip_cell, shape_cell = fig.add_gridspec(2, 1, height_ratios=heights)
+        axes = _strip_axes(strip_cell, lines, columns, pictures)
+        return fig, axes, fig.add_subplot(shape_cell)
+
+    fig_height = float(np.clip(strip_height, MAP_HEIGHT, HIGHEST_STRIP))
+    fig = blank(STRIP_WIDTH, fig_height)
     strip_cell, shape_cell = fig.add_gridspec(1, 2, width_ratios=[4.2, 3.0])
-    grid = strip_cell.subgridspec(lines, columns)
+    axes = _strip_axes(strip_cell, lines, columns, pictures)
+    around = max(1e-3, (fig_height - MAP_HEIGHT) / 2)
+    cells = shape_cell.subgridspec(3, 1, height_ratios=[around, MAP_HEIGHT, around])
+    return fig, axes, fig.add_subplot(cells[1])
+
+
+def _strip_axes(cell: Any, lines: int, columns: int, pictures: int) -> list:
+    """Return the Axes of the pictures in a cell of a figure."""
+    grid = cell.subgridspec(lines, columns)
     axes = grid.subplots(squeeze=False, sharex=True, sharey=True)
     for ax in axes.flat[pictures:]:
         ax.remove()
-    around = max(1e-3, (fig_height - MAP_HEIGHT) / 2)
-    cells = shape_cell.subgridspec(3, 1, height_ratios=[around, MAP_HEIGHT, around])
-    return fig, list(axes.flat[:pictures]), fig.add_subplot(cells[1])
+    return list(axes.flat[:pictures])
 
 
-def _number_shapes(ax: Axes, motion: Motion, rows: np.ndarray) -> None:
+def _number_shapes(ax: Axes, motion: ShownMotion, rows: np.ndarray) -> None:
     """Write the pictures' numbers at their shapes on the plane, away from its
     middle."""
     shapes = [tuple(np.round(motion.alpha[row], 9)) for row in rows]
@@ -314,7 +363,7 @@ def _number_shapes(ax: Axes, motion: Motion, rows: np.ndarray) -> None:
         _write_number(ax, text, shape, offset)
 
 
-def _number_phases(ax: Axes, motion: Motion, rows: np.ndarray) -> None:
+def _number_phases(ax: Axes, motion: ShownMotion, rows: np.ndarray) -> None:
     """Write the pictures' numbers above lines at their phases."""
     turns = [round(float(motion.phase[row] / (2 * np.pi) % 1), 9) for row in rows]
     for turn, text in _numbers_by_place(turns).items():

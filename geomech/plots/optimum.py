@@ -14,7 +14,6 @@ from geomech.plots.stretched import stretched_map
 from geomech.plots.style import axes_of, figure, quantity, styled
 from geomech.results.fields import field_of, stretch_of
 from geomech.results.scenes import scene_of
-from geomech.studies.estimates.effort import units
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -98,7 +97,7 @@ def stretched_optimum(
         gained_component(result),
         ax=ax,
         labels=shape_labels(system),
-        unit=units(system)["path_length"],
+        unit=result["stretched_shape"].units,
         clim=clim,
     )
     percent = 100 * plane.rms

@@ -11,6 +11,7 @@ import numpy as np
 from geomech.mathematics.gaits import Gait
 from geomech.mathematics.geometry.representations.field import Field
 from geomech.mathematics.geometry.stretch import Stretch
+from geomech.plots.look import font_points
 from geomech.plots.maps import (
     ANGLES,
     PHASES,
@@ -156,14 +157,14 @@ def _label_constant_lines(
     centred = {"ha": "center", "va": "center"}
     for x, place in zip(ticks, ends + outwards):
         text = with_minus_signs(f"{x:g}")
-        ax.text(*place, text, fontsize=6, color="0.3", **centred)
+        ax.text(*place, text, fontsize=font_points(6), color="0.3", **centred)
     middle = len(ticks) // 2
     along_x, along_y = ends[middle + 1] - ends[middle - 1]
     tilt = np.degrees(np.arctan2(along_y, along_x))
     ax.text(
         *(ends + 3.4 * outwards)[middle],
         quantity(*label),
-        fontsize=8,
+        fontsize=font_points(8),
         rotation=(tilt + 80) % 180 - 80,
         rotation_mode="anchor",
         **centred,

@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, get_origin
 
 from geomech.io.files import atomic_file
+from geomech.plots import look
+from geomech.plots.look import STYLE as STYLE
 from geomech.plots.shown import ShownAxes, ShownFigure
 from rft.core.refusal import Refusal
 
@@ -18,6 +20,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 GREEK = ("alpha", "gamma", "theta")  # first letters of shape variables and parameters
+PANEL_WIDTH = 2.25  # in, of the narrowest panel of several side by side
+STACKED_HEIGHT = 2.3  # in, of a panel with curves that stands above another
+SHORTEST_PANEL = 0.8  # of its usual height, of a panel that is narrower than usual
 MARKED = 40  # points of the longest line that has a marker at each
 LEGEND_ENTRY = 2.2  # in, of a figure's width, for an entry of its legend
 MINUS_SIGN = "\N{MINUS SIGN}"
@@ -32,19 +37,6 @@ SOURCES = {  # where a value of each class comes from, for refusals
 }
 # Of zlib's nine levels: half the time of the usual six, for files a twentieth larger.
 PNG_COMPRESSION = 4
-STYLE = {
-    "font.size": 9,
-    "axes.labelsize": 9,
-    "axes.titlesize": 9,
-    "legend.fontsize": 8,
-    "legend.frameon": False,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "savefig.dpi": 200,
-    "svg.fonttype": "none",
-    "hatch.linewidth": 0.35,
-    "lines.markersize": 3,
-}
 
 
 Arguments = ParamSpec("Arguments")
@@ -52,8 +44,10 @@ Drawn = TypeVar("Drawn")
 
 
 def styled(draw: Callable[Arguments, Drawn]) -> Callable[Arguments, Drawn]:
-    """Return a drawing function that uses the project's style, whatever the caller's
-    is, and refuses a first argument that it does not draw."""
+    """Return a drawing function that uses the look that is asked for
+    (`geomech.plots.look`), and refuses a first argument that it does not draw.
+
+    A figure that it returns fits the look."""
 
     @functools.wraps(draw)
     def in_style(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Drawn:
@@ -61,8 +55,12 @@ def styled(draw: Callable[Arguments, Drawn]) -> Callable[Arguments, Drawn]:
 
         if args:
             _require_drawn(draw, args[0])
-        with mpl.rc_context(STYLE):
-            return draw(*args, **kwargs)
+        asked = look.current()
+        with mpl.rc_context(asked.rc):
+            drawn = draw(*args, **kwargs)
+            if isinstance(drawn, ShownFigure):
+                drawn.finish(asked)
+        return drawn
 
     return in_style
 
@@ -91,13 +89,17 @@ def _drawn_kind(draw: Callable[..., Any]) -> type | None:
     return None
 
 
-@styled
 def blank(width: float, height: float, layout: str = "constrained") -> Any:
     """Return an empty Figure whose Axes will be laid out without overlap.
 
     width, height: in inches. layout: "constrained", or "compressed", which closes the
     gaps in a row of maps."""
-    fig = ShownFigure(figsize=(width, height), layout=layout)
+    import matplotlib as mpl
+
+    asked = look.current()
+    with mpl.rc_context(asked.rc):
+        fig = ShownFigure(figsize=(asked.inches or width, height), layout=layout)
+    fig.rc = asked.rc
     fig.get_layout_engine().set(wspace=0.06)
     return fig
 
@@ -109,12 +111,15 @@ def figure(
     columns: int = 1,
     rows: int = 1,
     layout: str = "constrained",
+    narrowest: float = PANEL_WIDTH,
     **grid: Any,
 ) -> tuple[Any, Any]:
     """Return (Figure, array of Axes (rows, columns)), both of which a notebook shows.
 
-    width, height: in inches. layout: "constrained", or "compressed", which closes the
-    gaps in a row of maps. grid: as for matplotlib's GridSpec.
+    width, height: in inches, of the default look. In a narrower one, panels that have
+    no room side by side stand one above the other. layout: "constrained", or
+    "compressed", which closes the gaps in a row of maps. narrowest: width that a panel
+    needs, in. grid: as for matplotlib's GridSpec.
 
     Examples
     --------
@@ -123,12 +128,63 @@ def figure(
     >>> axes.shape
     (1, 2)
     """
-    fig = blank(width, height, layout)
     subplot = {"axes_class": ShownAxes}
-    axes = fig.subplots(
-        rows, columns, squeeze=False, gridspec_kw=grid, subplot_kw=subplot
-    )
-    return fig, axes
+    fit = columns_that_fit(width, columns, narrowest)
+    return panels(width, height, columns, rows, fit, subplot, layout, grid)
+
+
+def panels(
+    width: float,
+    height: float,
+    columns: int,
+    rows: int,
+    fit: int,
+    subplot: dict[str, Any],
+    layout: str = "constrained",
+    grid: dict[str, Any] | None = None,
+) -> tuple[Any, Any]:
+    """Return (Figure, array of Axes (rows, columns)), of which only ``fit`` stand side
+    by side.
+
+    width, height: in inches, of the default look. subplot, grid: of
+    `Figure.subplots`."""
+    if fit == columns:
+        fig = blank(width, height_that_fits(width, height), layout)
+        axes = fig.subplots(
+            rows, columns, squeeze=False, gridspec_kw=grid, subplot_kw=subplot
+        )
+        return fig, axes
+    lines = -(-columns // fit)
+    panel_height = height_that_fits(width / columns * fit, height / rows)
+    if layout == "constrained" and "projection" not in subplot:
+        panel_height = min(panel_height, STACKED_HEIGHT)
+    fig = blank(width, panel_height * lines * rows, layout)
+    cells = fig.subplots(lines * rows, fit, squeeze=False, subplot_kw=subplot)
+    axes = cells.reshape(rows, lines * fit)
+    for ax in axes[:, columns:].flat:
+        ax.remove()
+    return fig, axes[:, :columns]
+
+
+def columns_that_fit(width: float, columns: int, narrowest: float = PANEL_WIDTH) -> int:
+    """Return how many of the columns of a figure the look has room for side by side.
+
+    width: of the figure in the default look, in. narrowest: width that a panel needs,
+    in."""
+    inches = look.current().inches
+    if inches is None or inches >= width:
+        return columns
+    narrowest = min(narrowest, width / columns)
+    return min(columns, max(1, int(inches / narrowest + 1e-9)))
+
+
+def height_that_fits(width: float, height: float) -> float:
+    """Return the height of a figure, or of a part, whose size is (width, height) in the
+    default look."""
+    inches = look.current().inches
+    if inches is None:
+        return height
+    return height * min(1.0, max(SHORTEST_PANEL, inches / width))
 
 
 def quantity(name: str, unit: str = "") -> str:
@@ -201,10 +257,9 @@ def check_format(path: str | Path) -> Path:
     return path
 
 
-@styled
 def save(fig: Figure, *paths: str | Path) -> None:
     """Write a figure, or the figure of Axes, to files, each of which appears whole or
-    not at all.
+    not at all. Letters stay text in .pdf and .svg.
 
     The figure is laid out once and drawn once for each file; `savefig` lays out and
     draws twice for each.
@@ -219,14 +274,18 @@ def save(fig: Figure, *paths: str | Path) -> None:
     >>> path.exists()
     True
     """
+    import matplotlib as mpl
+
     fig = getattr(fig, "figure", fig)
     canvas = fig.canvas
     engine = fig.get_layout_engine()
     dpi = fig.dpi
+    rc = {**look.current().rc, **getattr(fig, "rc", {})}
     try:
         for path in map(check_format, paths):
-            with atomic_file(path) as part:
-                fig.dpi = STYLE["savefig.dpi"]
+            with atomic_file(path) as part, mpl.rc_context(rc):
+                if rc["savefig.dpi"] != "figure":
+                    fig.dpi = rc["savefig.dpi"]
                 _print(fig, path.suffix.lower(), part)
             fig.set_layout_engine("none")
     finally:

@@ -11,6 +11,7 @@ import numpy as np
 from geomech.mathematics.gaits import Gait
 from geomech.mathematics.geometry.connection import Connection
 from geomech.mathematics.geometry.representations.field import Field
+from geomech.plots.look import colours, font_points
 from geomech.plots.maps import (
     ANGLES,
     PHASES,
@@ -190,7 +191,7 @@ def _draw_contours(
     def label(level: float) -> str:
         return with_minus_signs(f"{level:g}")
 
-    ax.clabel(lines, levels[::2], fmt=label, fontsize=6)
+    ax.clabel(lines, levels[::2], fmt=label, fontsize=font_points(6))
 
 
 def _sign_legend(ax: Axes, component: int, signs: set[int], y: float) -> None:
@@ -282,7 +283,7 @@ def ccf_surface(
     ax.plot_surface(
         *np.meshgrid(*axes, indexing="ij"),
         np.clip(values, -top, top),
-        cmap=cm.vik,
+        cmap=colours(cm.vik),
         vmin=-top,
         vmax=top,
         rcount=121,
@@ -310,7 +311,7 @@ def ccf_surface(
     )
     ax.set_zlabel(ccf_label(component, field.unit, labels), labelpad=6)
     ax.set_zticks([x for x in ax.get_zticks() if -top <= x <= top])
-    ax.tick_params(labelsize=7)
+    ax.tick_params(labelsize=font_points(7))
     ax.view_init(elev=28, azim=-58)
     ax.set_box_aspect(None, zoom=0.86)
     return ax

@@ -5,6 +5,7 @@ The class of its question defines it; `kind_of` finds the class.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from geomech.core.face import implementation
@@ -19,11 +20,18 @@ class Plain:
     All of it is static and takes a result, whether computed or read from a file.
 
     table: dimensions of the result's CSV file and data frame; those of its first
-    variable if empty.
+    variable if empty. looks: the options that its picture shares with others
+    (`geomech.questions.shared.looks`).
     """
 
     table: ClassVar[tuple[str, ...]] = ()
     draw: ClassVar[Any] = None
+    looks: ClassVar[tuple[str, ...]] = ("width", "font", "style", "legend")
+
+    @staticmethod
+    def ways() -> Iterable[str]:
+        """Return the ways to draw it, which its option ``style`` names as well."""
+        return ()
 
     @staticmethod
     def files() -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import inspect
 from collections.abc import Callable
 from functools import partial
@@ -10,7 +11,7 @@ from typing import Annotated, Any, NamedTuple, Optional
 
 import typer
 
-from geomech.questions.shared import base
+from geomech.questions.shared import base, looks
 from geomech.questions.shared.base import Declared, Option, Question
 from geomech.shell import pipeline
 from geomech.shell.options import (
@@ -26,19 +27,22 @@ ENDINGS = (".nc", ".json", ".csv", ".mat", ".txt")  # of `geomech.results.files.
 IN_FOLDER = (".json", ".csv", ".nc", ".txt")  # formats that fill a folder
 PICTURES = (".png", ".pdf", ".svg")  # those of --plot
 FOLDER = ""  # in place of an ending
+FIGURE = "Figure, with --plot"  # heading of the options that pictures share
 SUBJECT = "subject"  # name of the first argument in the function of a command
 
 
 class Declaration(NamedTuple):
     """All that the command of a question takes.
 
-    fields: its own options. picture: options of its picture. files: options of its
-    files by ending, and by FOLDER those of the folder that its command fills."""
+    fields: its own options. picture: options of its picture. look: those that pictures
+    share. files: options of its files by ending, and by FOLDER those of the folder that
+    its command fills."""
 
     question: type[Question]
     subject: base.Subject | None
     fields: Declared
     picture: Declared
+    look: Declared
     files: dict[str, Declared]
 
     @property
@@ -59,6 +63,7 @@ def declaration(question: type[Question]) -> Declaration:
         subject,
         base.options(question),
         base.keyword_options(question.draw),
+        looks.look_options(question),
         files,
     )
 
@@ -117,7 +122,10 @@ def parameters(declared: Declaration) -> list[inspect.Parameter]:
     files_alone = without(declared.all_files, declared.picture)
     for name, declaration in {**declared.picture, **files_alone}.items():
         found.append(option_parameter(name, *declaration))
-    return found + common_parameters(declared.question)
+    found += common_parameters(declared.question)
+    for name, declaration in without(declared.look, declared.picture).items():
+        found.append(option_parameter(name, *declaration, heading=FIGURE))
+    return found
 
 
 def common_parameters(question: type[Question]) -> list[inspect.Parameter]:
@@ -183,11 +191,14 @@ def subject_parameter(subject: base.Subject) -> inspect.Parameter:
 
 
 def option_parameter(
-    name: str, option: Option, kind: Any, default: Any
+    name: str, option: Option, kind: Any, default: Any, heading: str | None = None
 ) -> inspect.Parameter:
-    """Return the parameter of an option."""
+    """Return the parameter of an option. heading: that it has in the help."""
     settings = typer.Option(
-        base.flag(name, option), metavar=option.metavar or None, help=option.help
+        base.flag(name, option),
+        metavar=option.metavar or None,
+        help=option.help,
+        rich_help_panel=heading,
     )
     if kind is bool:
         return parameter(name, Annotated[bool, settings], False)
@@ -222,6 +233,7 @@ def request(
     if paths:  # plug-ins may add formats
         declared = declared._replace(files=file_options(kind, kind.files()))
     refuse_unused(declared, given, paths)
+    picture, look_values = picture_values(declared, given)
 
     subject = None
     if declared.subject is None:
@@ -230,6 +242,9 @@ def request(
         changes = {name: given[name] for name in declared.subject.changes}
         subject = declared.subject.load(given[SUBJECT], **changes)
         question = kind(subject, **option_values(declared.fields, given, subject))
+    look = None
+    if look_values:
+        look = looks.checked_look(kind, subject, look_values)
 
     file_values = {}
     for ending, options in declared.files.items():
@@ -239,17 +254,30 @@ def request(
         values = file_values.get(path.suffix.lower(), {})
         if kind.folder:
             values = file_values[FOLDER]
-        outputs.append(output(kind, path, values))
-    picture = option_values(declared.picture, given, subject)
+        outputs.append(in_look(output(kind, path, values), look))
+    picture = {
+        **picture,
+        **option_values(without(declared.picture, declared.look), given, subject),
+    }
     all_values = option_values(declared.all_files, given, subject)
     question = question.for_files(paths, all_values)
     if kind.folder:
         question.check_draw(**file_values[FOLDER])
     if plot is not None:
         question.check_draw(**picture)
-        outputs.append(figure(plot, picture))
+        outputs.append(in_look(figure(plot, picture), look))
         question = question.for_picture(**picture)
     return question, outputs
+
+
+def picture_values(
+    declared: Declaration, given: dict[str, Any]
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the values of the shared options that are the picture's own after all,
+    such as a style that is a way to draw, and those of its look."""
+    shared = {name: given[name] for name in declared.look if given[name] is not None}
+    look, own = looks.split(declared.question, shared)
+    return own, look
 
 
 def option_values(
@@ -285,6 +313,8 @@ def refuse_unused(
     if given.get("plot") is None:
         used = declared.files.get(FOLDER, {})
         unused = without(declared.picture, used)
+        if not any(is_folder(declared.question, path) for path in paths):
+            unused = {**unused, **declared.look}
         refuse_given(unused, given, "for a figure", "add --plot FILE")
     used = {}
     for path in paths:
@@ -316,6 +346,29 @@ def refuse_given(
         raise Refusal(f"{' and '.join(names)} {verb} {purpose}", instead=instead)
 
 
+def is_folder(question: type[Question], path: Path) -> bool:
+    """Return whether an output is a folder, which has pictures."""
+    from geomech.results.files import formats
+
+    if question.folder:
+        return True
+    return path.is_dir() and path.suffix.lower() not in formats(question)
+
+
+def in_look(output: pipeline.Output, look: Any) -> pipeline.Output:
+    """Return an output whose pictures have a look."""
+    if look is None:
+        return output
+
+    def write(result: Any, path: Path) -> None:
+        from geomech import plots
+
+        with plots.using(look):
+            output.write(result, path)
+
+    return dataclasses.replace(output, write=write)
+
+
 def output(
     question: type[Question], path: Path, options: dict[str, Any]
 ) -> pipeline.Output:
@@ -323,12 +376,12 @@ def output(
 
     Refusal for another ending, or without one, unless it is a folder or the question's
     command fills one."""
-    from geomech.results.files import formats, save, writer
+    from geomech.results.files import save, writer
 
     if question.folder:
         write = partial(question.fill, **options)
         return pipeline.Output(path, write, folder=True)
-    if path.is_dir() and path.suffix.lower() not in formats(question):
+    if is_folder(question, path):
         return pipeline.Output(path, fill, folder=True)
     if path.suffix.lower() in PICTURES and question.draw is not None:
         raise Refusal(

@@ -105,16 +105,27 @@ def save_result(result: Any, path: Path, **options: Any) -> None:
 
 @implements("Result.plot")
 def plot_result(result: Any, **options: Any) -> Any:
-    """Draw a result."""
+    """Draw a result in the look that is asked for, or else in the present one."""
+    from geomech import plots
+    from geomech.questions.shared import looks
     from geomech.results.kinds import kind_of
+    from geomech.results.lengths import in_lengths
 
-    draw = kind_of(result).draw
-    if draw is None:
+    kind = kind_of(result)
+    if kind.draw is None:
         raise Refusal(
             f"no picture exists of {result.kind or 'this result'}",
             instead="print it, or save it to a file",
         )
-    return draw(result, **options)
+    shared, own = looks.split(kind, options)
+    if own.get("ax") is not None and {"width", "legend"} & {*shared}:
+        raise Refusal(
+            "``width`` and ``legend`` are of a figure", instead="drop them, or ``ax``"
+        )
+    with plots.using(plots.Look(**shared)) as look:
+        if look.unit is not None and "unit" in kind.looks:
+            result = in_lengths(result, look.unit)
+        return kind.draw(result, **own)
 
 
 @implements("Result.kind")

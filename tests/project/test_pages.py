@@ -87,7 +87,7 @@ def commands(page):
         line
         for language in ("", "sh", "console")
         for block in blocks(page, language)
-        for line in block.splitlines()
+        for line in block.replace("\\\n", " ").splitlines()
     ]
     inline = re.findall(r"`([^`]+)`", re.sub(r"(?ms)^```.*?^```$", "", text(page)))
     for line in code + [" ".join(x.split()).replace("\\|", "|") for x in inline]:

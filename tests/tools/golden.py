@@ -429,20 +429,26 @@ def drawn(axes) -> list[float]:
     return numbers
 
 
-def pictures():
-    """What every question draws."""
+def pictured(*names):
+    """Yield the names of PICTURES, their results, and options of their pictures."""
     with scene_files(), warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        for name, (question, subject, fields, options) in PICTURES.items():
+        for name in names or PICTURES:
+            question, subject, fields, options = PICTURES[name]
             about = geomech
             given = [subject]
             if subject.endswith(".toml"):
                 about = geomech.study(subject)
                 given = []
-            result = getattr(about, question)(*given, **fields)
-            figure = result.plot(**options)
-            for k, axes in enumerate(figure.axes):
-                yield f"picture, {name}, axes {k + 1}", drawn(axes)
+            yield name, getattr(about, question)(*given, **fields), options
+
+
+def pictures():
+    """What every question draws."""
+    for name, result, options in pictured():
+        figure = result.plot(**options)
+        for k, axes in enumerate(figure.axes):
+            yield f"picture, {name}, axes {k + 1}", drawn(axes)
 
 
 # Lines whose costs are known in some hundredths of a second, by what they are about.

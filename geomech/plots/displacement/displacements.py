@@ -14,8 +14,9 @@ from geomech.core.summary import listed
 from geomech.core.variables import Result
 from geomech.mathematics.geometry.representations.field import UNKNOWN_UNIT
 from geomech.mathematics.tiers import TIERS, Tier
+from geomech.plots.look import current, font_points
 from geomech.plots.style import axes_of, figure, shared_legend, styled
-from geomech.scenes.data.measurements import converted, units_of
+from geomech.scenes.data.measurements import converted, points_of, units_of
 from geomech.studies.displacement.variables import QUANTITIES, pose_quantities
 from rft.core.refusal import printable
 
@@ -61,9 +62,9 @@ def displacement(
 
     errors: draw a band of each tier's estimated error, in its colour. An uncertain
     medium has an outlined band. data: measurements to draw as points, "amplitude",
-    "value" and "error" (N,), such as a data frame of pandas; the error may be absent. A
-    name may end in a unit, as in a file: "amplitude_deg", "value_cm"; without one the
-    unit is that of the axis.
+    "value" and "error" (N,), such as a data frame of pandas, or columns by quantity
+    such as "x" and "x_error"; errors may be absent. A name may end in a unit, as in a
+    file: "amplitude_deg", "value_cm"; without one the unit is that of the axis.
 
     Examples
     --------
@@ -81,7 +82,9 @@ def displacement(
     errors = errors and variable.error is not None
     abscissae = amplitudes
     if data is not None:
-        data = converted(data, _data_units(result, quantity))
+        columns = converted(data, _data_units(result, quantity))
+        data = points_of(columns, quantity, [quantity])
+    if data is not None:
         abscissae = np.append(amplitudes, data["amplitude"])
     span = np.ptp(abscissae)
 
@@ -239,8 +242,9 @@ def displacement_figure(
     those that are zero; a line below names these and the reason.
 
     components: of PANELS, drawn even where they are zero; by default all. data:
-    measurements of the first gait, drawn as `displacement` does on the first of the
-    components, else on x.
+    measurements of the first gait, as `displacement` takes them, drawn on every
+    quantity that they have. A column "value" is of the first of the components, else of
+    x and, by its size, of the net distance.
 
     Examples
     --------
@@ -250,12 +254,14 @@ def displacement_figure(
     >>> fig = displacement_figure({"circle": study.displacement([0.5, 1.0])})
     """
     named = [PANELS[choose("component", name, PANELS)] for name in components]
+    first = next(iter(tables.values()))
+    points = _points_by_quantity(first, data, named)
     zeros: list[dict[str, str]] = [{} for _ in tables]
     if not named:
         zeros = [_zero_reasons(table) for table in tables.values()]
-        if data is not None:
-            # x is never left out next to measurements.
-            zeros[0].pop("x", None)
+        for quantity in points:
+            # No quantity is left out next to measurements of it.
+            zeros[0].pop(quantity, None)
     moving = [q for q in QUANTITIES if not all(q in zero for zero in zeros)]
     panels = named or moving or [*QUANTITIES]
 
@@ -265,14 +271,15 @@ def displacement_figure(
             if quantity in zero and len(zero) < len(QUANTITIES):
                 _write_zero(ax, quantity, zero[quantity])
                 continue
-            points = data if ax is axes[0, 0] else None
+            own = points.get(quantity) if table is first else None
             displacement(
-                table, ax=ax, quantity=quantity, legend=False, data=points, marker="o"
+                table, ax=ax, quantity=quantity, legend=False, data=own, marker="o"
             )
         title = printable(name)
         if "note" in table.attributes:
             title = f"{title} (not in the scene)"
-        row[0].set_title(title, loc="left")
+        if len(tables) > 1 or current().inches is None:  # a page has its caption
+            row[0].set_title(title, loc="left")
         frequency = table.attributes.get("frequency")
         if frequency and panels[-1] == "net_distance":
             _draw_speed_axis(row[-1], frequency, table["x"].units)
@@ -281,8 +288,28 @@ def displacement_figure(
     shared_legend(fig, place)
     if not named:
         absent = {q: why for q, why in zeros[0].items() if q not in panels}
-        fig.supxlabel(_zero_note(absent), fontsize=8, color="0.3")
+        fig.supxlabel(_zero_note(absent), fontsize=font_points(8), color="0.3")
     return fig
+
+
+def _points_by_quantity(
+    table: Result, data: Mapping | None, named: Sequence[str]
+) -> dict[str, dict]:
+    """Return the points of measurements by the quantity that they are of.
+
+    named: quantities that are drawn; by default all."""
+    if data is None:
+        return {}
+    value_of = [*named[:1]] or ["x", "net_distance"]
+    if {*named} == {"x", "net_distance"}:
+        value_of = [*named]
+    columns = converted(data, _data_units(table, value_of[0]))
+    found = {}
+    for quantity in named or QUANTITIES:
+        points = points_of(columns, quantity, value_of)
+        if points is not None:
+            found[quantity] = points
+    return found
 
 
 def _displacement_panels(columns: int, rows: int) -> tuple[Figure, Any]:
@@ -324,7 +351,7 @@ def _zero_reasons(table: Result) -> dict[str, str]:
 def _write_zero(ax: Axes, quantity: str, reason: str) -> None:
     """Write in place of a panel that its quantity is zero, and why."""
     lines = "\n".join(textwrap.wrap(f"{quantity}: zero {reason}", 26))
-    look = {"ha": "center", "va": "center", "fontsize": 8, "color": "0.3"}
+    look = {"ha": "center", "va": "center", "fontsize": font_points(8), "color": "0.3"}
     ax.text(0.5, 0.5, lines, transform=ax.transAxes, **look)
     ax.set_axis_off()
 

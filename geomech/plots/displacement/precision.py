@@ -10,6 +10,7 @@ import numpy as np
 
 from geomech.core.variables import Result
 from geomech.mathematics.tiers import TIERS
+from geomech.plots.look import font_points
 from geomech.plots.style import figure, styled
 
 if TYPE_CHECKING:
@@ -89,6 +90,7 @@ def study_lines(result: Result, name: str = "error", against: str = "") -> list[
     return lines
 
 
+@styled
 def accuracy_figure(result: Result) -> Figure:
     """Draw an accuracy study.
 
@@ -150,7 +152,7 @@ def work_precision(result: Result, axes: Any = None) -> Any:
             bbox_to_anchor=(0.5, -0.18),
             title="tier: setting, from coarse to fine",
         )
-        ax.get_legend().get_title().set_fontsize(8)
+        ax.get_legend().get_title().set_fontsize(font_points(8))
     return axes
 
 
@@ -162,7 +164,7 @@ def draw_line(ax: Any, line: Line, marker: str, colour: str) -> None:
     label = f"{line.tier}: {setting}, {line.values[0]:g} to {line.values[-1]:g}"
     label += order_text(line.order)
     ax.loglog(line.seconds, error, marker=marker, label=label, color=colour, lw=1.0)
-    look = {"textcoords": "offset points", "fontsize": 7, "color": colour}
+    look = {"textcoords": "offset points", "fontsize": font_points(7), "color": colour}
     first = (line.seconds[0], error[0])
     last = (line.seconds[-1], error[-1])
     ax.annotate(f"{line.values[0]:g}", first, (0, 5), ha="center", **look)

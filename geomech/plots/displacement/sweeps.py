@@ -9,6 +9,7 @@ import numpy as np
 
 from geomech.core.variables import Result
 from geomech.plots.displacement.displacements import medium_band
+from geomech.plots.look import colours
 from geomech.plots.style import MARKED, figure, quantity, styled
 from geomech.scenes.model import Scene
 from geomech.studies.displacement.cycles import AMPLITUDE
@@ -68,6 +69,7 @@ ROBOT_UNITS = {  # likewise, in scenes of robots
 }
 
 
+@styled
 def sweep_figure(scene: Any, result: Result) -> Figure:
     """Draw a sweep over one parameter or two: net distance or speed, or the speed of a
     robot; refuse more parameters.
@@ -175,9 +177,9 @@ def _draw_map(
     from cmcrameri import cm
 
     top = np.abs(values).max() or 1.0
-    look: dict[str, Any] = {"cmap": "viridis"}
+    look: dict[str, Any] = {"cmap": colours("viridis")}
     if values.min() < 0 < values.max():
-        look = {"cmap": cm.vik, "vmin": -top, "vmax": top}
+        look = {"cmap": colours(cm.vik), "vmin": -top, "vmax": top}
     image = ax.pcolormesh(x, y, values.T, shading="nearest", rasterized=True, **look)
     if x[0] < x[-1]:
         ax.set_xlim(x[0], x[-1])
@@ -225,7 +227,7 @@ def _speed_figure(scene: Any, result: Result) -> Figure:
     fig, axes = figure(4.6, 3.2)
     ax = axes[0, 0]
     curves(ax, values[0], result, names)
-    ax.set(xlabel=labels[0], ylabel="mean speed (m/s)")
+    ax.set(xlabel=labels[0], ylabel=f"mean speed ({result['speed'].unit})")
     return fig
 
 
@@ -241,7 +243,7 @@ def curves(ax: Axes, values: Any, result: Result, names: Any) -> None:
     error = result["speed"].error.reshape(rows, -1)
     status = result["status"].values.reshape(rows, -1)
     for k, label in enumerate(names):
-        colour = cm.batlow(0.85 * k / max(1, len(names) - 1))
+        colour = colours(cm.batlow)(0.85 * k / max(1, len(names) - 1))
         ax.errorbar(
             values,
             speed[:, k],

@@ -3,15 +3,16 @@ displacements of its cycles."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from geomech.core.variables import Result, Variable
 from geomech.mathematics.geometry.representations.tube import TaylorSeries
+from geomech.plots.look import font_points
 from geomech.plots.maps import TITLES, draw_arrow, row_name
 from geomech.plots.shown import ShownAxes
-from geomech.plots.style import figure, quantity, styled
+from geomech.plots.style import blank, columns_that_fit, figure, quantity, styled
 from geomech.results.measured import series_of
 
 if TYPE_CHECKING:
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 POSE = ("x", "y", "heading")
+WIDTH = 10.8  # in
+STACKED_HEIGHTS = (3.6, 1.2, *[1.6] * 3, *[2.6] * 3)  # in, of rows in a narrow look
 TICKS = {0.0: "0", np.pi: r"$\pi$", 2 * np.pi: r"$2\pi$"}
 
 
@@ -31,13 +34,20 @@ def measured_figure(result: Result) -> Figure:
     middle the rows of A along the mean gait with bands, and the right the net poses of
     the cycles as logged, against those that the connection predicts."""
     series = series_of(result)
-    fig, axes = figure(10.8, 6.6, 3, 3, width_ratios=(1.4, 1.2, 1.0))
+    if columns_that_fit(WIDTH, 3) == 3:
+        fig, axes = figure(WIDTH, 6.6, 3, 3, width_ratios=(1.4, 1.2, 1.0))
+        grid = axes[0, 0].get_gridspec()
+        places = (grid[:2, 0], grid[2, 0])
+    else:
+        fig, axes = _stacked_panels()
+        grid = axes[0, 0].get_gridspec()
+        places = (grid[0, :], grid[1, :])
     for ax in axes[:, 0]:
         ax.remove()
-    shapes = fig.add_subplot(axes[0, 0].get_gridspec()[:2, 0], axes_class=ShownAxes)
+    shapes = fig.add_subplot(places[0], axes_class=ShownAxes)
     axes[0, 2].set_title("cycles", loc="left")
     _draw_shapes(result, series, shapes)
-    _write_displacement(result, fig.add_subplot(axes[0, 0].get_gridspec()[2, 0]))
+    _write_displacement(result, fig.add_subplot(places[1]))
     for component in range(3):
         _draw_row(result, series, component, axes[component, 1])
         _draw_cycles(result, component, axes[component, 2])
@@ -46,6 +56,18 @@ def measured_figure(result: Result) -> Figure:
     axes[0, 1].legend(loc="lower center", bbox_to_anchor=(0.5, 1.12), ncols=4)
     axes[2, 1].set(xlabel=r"phase of the mean gait $\varphi$ (rad)")
     return fig
+
+
+def _stacked_panels() -> tuple[Figure, Any]:
+    """Return (Figure, Axes (3, 3)) for a narrow look, one column below another."""
+    fig = blank(WIDTH, sum(STACKED_HEIGHTS))
+    grid = fig.add_gridspec(len(STACKED_HEIGHTS), 1, height_ratios=STACKED_HEIGHTS)
+    rows = [[0, 2, 5], [1, 3, 6], [1, 4, 7]]
+    axes = np.empty((3, 3), object)
+    for place in np.ndindex(3, 3):
+        row = rows[place[0]][place[1]]
+        axes[place] = fig.add_subplot(grid[row, 0], axes_class=ShownAxes)
+    return fig, axes
 
 
 def _joint_columns(result: Result) -> list[str]:
@@ -88,6 +110,8 @@ def _draw_shapes(result: Result, series: TaylorSeries, ax: Axes) -> None:
 
 def _write_displacement(result: Result, ax: Axes) -> None:
     """Write the net displacement per cycle, logged and predicted, as a small table."""
+    from matplotlib.transforms import blended_transform_factory
+
     ax.set_axis_off()
     level = 100 * float(result.attributes["level"])
     head = f"net displacement per cycle, {level:.3g} % intervals"
@@ -97,10 +121,16 @@ def _write_displacement(result: Result, ax: Axes) -> None:
         predicted = result[f"{name}_predicted"]
         title = f"{name} ({logged.unit})"
         rows.append((title, _value_with_error(logged), _value_with_error(predicted)))
-    ax.text(0.0, 0.8, head, transform=ax.transAxes)
+    across = ax.transAxes
+    columns = (0.0, 0.26, 0.64)
+    if columns_that_fit(WIDTH, 3) < 3:  # over the width of the figure
+        across = blended_transform_factory(ax.figure.transFigure, ax.transAxes)
+        columns = (0.02, 0.27, 0.63)
+    ax.text(columns[0], 0.8, head, transform=across)
     for k, row in enumerate(rows):
-        for x, cell in zip((0.0, 0.26, 0.64), row):
-            ax.text(x, 0.62 - 0.17 * k, cell, transform=ax.transAxes, fontsize=8)
+        y = 0.62 - 0.17 * k
+        for x, cell in zip(columns, row):
+            ax.text(x, y, cell, transform=across, fontsize=font_points(8))
 
 
 def _value_with_error(variable: Variable) -> str:

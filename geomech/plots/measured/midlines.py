@@ -31,7 +31,7 @@ def midlines_figure(result: Result) -> Figure:
     if has_prediction:
         fig, axes = figure(9.6, 6.0, 3, 2)
     else:
-        fig, axes = figure(9.6, 3.2, 3)
+        fig, axes = figure(9.6, 3.4, 3)
     _draw_track(result, axes[0, 0])
     _draw_along_body(result, "slip", "rad", axes[0, 1])
     _draw_along_body(result, "amplitude", "BL", axes[0, 2])
@@ -70,7 +70,7 @@ def _draw_track(result: Result, ax: Axes) -> None:
     ax.set(xlabel=f"x ({x.unit})", ylabel=f"y ({y.unit})")
     ax.set_aspect("equal", adjustable="datalim")
     ax.set_title(f"{len(x.values)} cycles", loc="left")
-    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.28), ncols=2)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=2)
 
 
 def _draw_along_body(result: Result, name: str, unit: str, ax: Axes) -> None:

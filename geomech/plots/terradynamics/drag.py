@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from geomech.core.variables import Result
+from geomech.plots.look import font_points
 from geomech.plots.style import figure, styled
 
 if TYPE_CHECKING:
@@ -55,7 +56,9 @@ def drag_figure(result: Result) -> Figure:
         xlim=(-2, 92),
         ylim=(-largest, largest),
     )
-    bottom.set_title(f"rms {float(result['rms']):.3g} N", loc="left", fontsize=8)
+    bottom.set_title(
+        f"rms {float(result['rms']):.3g} N", loc="left", fontsize=font_points(8)
+    )
     for ax in (top, bottom):
         ax.set_xticks(range(0, 91, 15))
     fig.get_layout_engine().set(hspace=0.06)

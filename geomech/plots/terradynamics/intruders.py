@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from geomech.plots.look import colours, font_points
 from geomech.plots.maps import draw_colours, largest
 from geomech.plots.style import figure, styled
 from geomech.scenes.terradynamics.solid import MeshIntrusion
@@ -38,7 +39,11 @@ def stress_figure(survey: Any, point: tuple[float, float] | None = None) -> Figu
     for ax, name in zip(axes[0], "zx"):
         stress_map(ax, survey, name)
         if survey.pulling:
-            ax.set_title("hatched: pulls on the leading face", loc="left", fontsize=8)
+            ax.set_title(
+                "hatched: pulls on the leading face",
+                loc="left",
+                fontsize=font_points(8),
+            )
         if point:
             beta, gamma, _ = mirrored_ahead(*point)
             look = {"mfc": "white", "mec": "black", "ms": 5, "zorder": 5}
@@ -117,8 +122,9 @@ def intrusion_figure(scene: Any, result: Any) -> Any:
     fig, axes = figure(10.2, 3.2, 3)
     columns = {name: v.values for name, v in result.items() if v.dims == ("t",)}
     if hasattr(scene, "mesh"):
+        place = axes[0, 0].get_subplotspec()
         axes[0, 0].remove()
-        ax = fig.add_subplot(1, 3, 1, projection="3d")
+        ax = fig.add_subplot(place, projection="3d")
         _draw_largest_force(ax, scene, columns)
         forces = ["force_x", "force_y", "force_z"]
         moments = ["moment_x", "moment_y", "moment_z"]
@@ -147,7 +153,7 @@ def _draw_largest_force(ax: Any, scene: Any, columns: dict[str, np.ndarray]) -> 
     run = MeshIntrusion(trajectory, force, columns["moment"], columns["power"])
     draw_stress(ax, *scene.faces(run, step))
     t = columns["t"][step]
-    ax.set_title(f"where the force is largest, t = {t:.3g} s", fontsize=8)
+    ax.set_title(f"where the force is largest, t = {t:.3g} s", fontsize=font_points(8))
 
 
 def _draw_columns(
@@ -185,11 +191,11 @@ def draw_stress(ax: Any, faces: Any, above: np.ndarray, unit: float = 1e3) -> No
     force = np.linalg.norm(faces.force, axis=-1)
     stress = force / np.where(areas > 0, areas, 1.0) / unit
     top = max(stress.max(initial=0.0), 1e-12)
-    shades = ScalarMappable(Normalize(0.0, top), cm.lajolla_r)
+    shades = ScalarMappable(Normalize(0.0, top), colours(cm.lajolla_r))
     grey = np.full((len(above), 4), [0.87, 0.87, 0.87, 1.0])
-    colours = np.concatenate([shades.to_rgba(stress), grey])
+    face_colours = np.concatenate([shades.to_rgba(stress), grey])
     corners = np.concatenate([faces.corners, above])
-    look = {"facecolors": colours, "edgecolors": colours, "lw": 0.2}
+    look = {"facecolors": face_colours, "edgecolors": face_colours, "lw": 0.2}
     ax.add_collection3d(Poly3DCollection(corners, rasterized=True, **look))
 
     x, y, z = faces.force.sum(0)
@@ -217,14 +223,21 @@ def _draw_scale(ax: Any, low: np.ndarray, span: np.ndarray) -> None:
     for axis, arrow in zip("xyz", np.eye(3) * length):
         ax.plot(*np.stack([corner, corner + arrow], 1), lw=1.0, **grey)
         place = corner + 1.25 * arrow
-        ax.text(*place, f"${axis}$", fontsize=8, ha="center", va="center", **grey)
+        ax.text(
+            *place,
+            f"${axis}$",
+            fontsize=font_points(8),
+            ha="center",
+            va="center",
+            **grey,
+        )
     low = corner - 0.1 * length
     high = np.maximum(low + span + 0.2 * length, corner + 1.3 * length)
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     ax.set_box_aspect(high - low, zoom=0.95)
     ax.set_axis_off()
     text = f"axes: {1e3 * length:g} mm"
-    ax.text2D(0.0, 0.02, text, transform=ax.transAxes, fontsize=8, **grey)
+    ax.text2D(0.0, 0.02, text, transform=ax.transAxes, fontsize=font_points(8), **grey)
 
 
 def _draw_poses(ax: Axes, points: np.ndarray, pose: np.ndarray) -> None:
@@ -242,7 +255,9 @@ def _draw_poses(ax: Axes, points: np.ndarray, pose: np.ndarray) -> None:
     ax.plot(pose[:, 0], pose[:, 1], color="C0", lw=0.8, ls=":", marker=marker)
     ax.axhline(0.0, color="peru", lw=1.0, zorder=0)
     ax.set(xlabel="x (m)", ylabel="z (m)", aspect="equal")
-    ax.set_title("light to dark: poses in time; brown: surface", fontsize=8)
+    ax.set_title(
+        "light to dark: poses in time; brown: surface", fontsize=font_points(8)
+    )
     ax.margins(0.08)
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from geomech.core.variables import Result
+from geomech.plots.look import colours, font_points
 from geomech.plots.style import figure, styled
 from geomech.plots.terradynamics.intruders import mirrored_ahead, square_of_angles
 
@@ -29,7 +30,7 @@ def plates_figure(result: Result) -> Figure:
     _draw_residuals(left, beta, gamma, residual_z, top, "z")
     _draw_residuals(middle, beta, gamma, residual_x, top, "x")
     rms = f"rms of both {float(result['rms']):.3g} N/cm$^3$"
-    left.set_title(rms, loc="left", fontsize=8, pad=9)
+    left.set_title(rms, loc="left", fontsize=font_points(8), pad=9)
     _draw_coefficients(right, result)
     return fig
 
@@ -47,7 +48,7 @@ def _draw_residuals(
     from cmcrameri import cm
 
     look = {
-        "cmap": cm.vik,
+        "cmap": colours(cm.vik),
         "vmin": -top,
         "vmax": top,
         "s": 28,
@@ -87,8 +88,10 @@ def _draw_coefficients(ax: Axes, result: Result) -> None:
         ax.plot([], [], "o-", mfc="white", label="not determined", **look)
     labels = [f"${name[0]}_{{{name[1:]}}}$" for name in names]
     ax.set(xticks=places, xticklabels=labels, ylabel="coefficient (N/cm$^3$)")
-    ax.tick_params(axis="x", labelsize=7.5)
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), fontsize=7, ncols=2)
+    ax.tick_params(axis="x", labelsize=font_points(7.5))
+    ax.legend(
+        loc="lower center", bbox_to_anchor=(0.5, 1.0), fontsize=font_points(7), ncols=2
+    )
 
 
 @styled
@@ -115,6 +118,8 @@ def penetration_figure(result: Result) -> Figure:
     bottom.plot(depth, force - law, "o", color="black", ms=3)
     bottom.axhline(0.0, color="0.7", lw=0.6, zorder=0)
     bottom.set(xlabel="depth (cm)", ylabel="data minus law (N)", xlim=(0, None))
-    bottom.set_title(f"rms {float(result['rms']):.3g} N", loc="left", fontsize=8)
+    bottom.set_title(
+        f"rms {float(result['rms']):.3g} N", loc="left", fontsize=font_points(8)
+    )
     fig.get_layout_engine().set(hspace=0.06)
     return fig

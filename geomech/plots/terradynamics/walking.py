@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from geomech.core.variables import Result
-from geomech.plots.style import figure, styled
+from geomech.plots.look import font_points
+from geomech.plots.style import columns_that_fit, figure, styled
+from geomech.results.lengths import shown_lengths
 from geomech.results.scenes import scene_of
 from geomech.studies.terradynamics import walking
 
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
 
 TRIPOD_COLOURS = ("0.2", "C0")  # of the legs that move in step
 STRIP_PICTURES = 6
+MEASURED_ROWS = 60  # of a film, at which the extent of a robot is taken
+NARROWEST_PICTURE = 1.6  # in
 FOLLOWED_SPAN = 2.4  # in half widths of a robot, to either side of one that is followed
 
 
@@ -27,8 +31,8 @@ def walk_figure(result: Result) -> Figure:
     t = result["t"].values
     fig, axes = figure(7.2, 4.6, 2, 2)
     lines = (
-        ("forward speed (m/s)", result["v_x"].values),
-        (r"height $z$ (m)", result["z"].values),
+        (f"forward speed ({result['v_x'].unit})", result["v_x"].values),
+        (rf"height $z$ ({result['z'].unit})", result["z"].values),
         ("pitch (degrees)", np.degrees(result["pitch"].values)),
     )
     for ax, (label, values) in zip(axes.ravel(), lines):
@@ -38,7 +42,9 @@ def walk_figure(result: Result) -> Figure:
     speed = float(result["speed"])
     axes[0, 0].axhline(speed, color="C3", lw=1.0, ls="--")
     status = str(result["status"].values)
-    axes[0, 0].set_title(f"mean {speed:.3g} m/s, {status}", color="C3")
+    axes[0, 0].set_title(
+        f"mean {speed:.3g} {result['speed'].unit}, {status}", color="C3"
+    )
     last = len(t) - 1
     walk_stage(axes[1, 1], result, np.array([last]))(last)
     return fig
@@ -50,7 +56,12 @@ def walk_strip(result: Result) -> Figure:
     t = result["t"].values
     begin = max(0.0, t[-1] - 1 / float(result["frequency"]))
     rows = rows_at(t, np.linspace(begin, t[-1], STRIP_PICTURES))
-    fig, axes = figure(2.3 * 3, 1.9 * 2, 3, 2, layout="compressed")
+    columns = columns_that_fit(2.3 * 3, 3, NARROWEST_PICTURE)
+    rows_of_pictures = -(-STRIP_PICTURES // columns)
+    size = (2.3 * columns, 1.9 * rows_of_pictures)
+    fig, axes = figure(
+        *size, columns, rows_of_pictures, "compressed", NARROWEST_PICTURE
+    )
     for ax, row in zip(axes.ravel(), rows):
         walk_stage(ax, result, np.array([row]))(row)
         ax.label_outer(remove_inner_ticks=False)
@@ -84,16 +95,25 @@ def walk_stage(
     if follow:
         shown_x = shown_x[:1]
         margin = FOLLOWED_SPAN * robot.half_width
-    ax.axhspan(-3 * reach, 0.0, color="peru", alpha=0.35, lw=0)
+    left, right = shown_x.min() - margin, shown_x.max() + margin
+    bottom, top = -1.2 * reach, 3.2 * reach
+    # A robot that stands high, pitches or sinks needs more than that.
+    low, high = robot_limits(robot, rows)
+    if not follow:
+        left = min(left, low[0] - 0.1 * reach)
+        right = max(right, high[0] + 0.1 * reach)
+    bottom = min(bottom, low[1] - 0.1 * reach)
+    top = max(top, high[1] + 0.1 * reach)
+    ax.axhspan(min(-3 * reach, bottom), 0.0, color="peru", alpha=0.35, lw=0)
     ax.set(
-        xlim=(shown_x.min() - margin, shown_x.max() + margin),
-        ylim=(-1.2 * reach, 3.2 * reach),
+        xlim=(left, right),
+        ylim=(bottom, top),
         aspect="equal",
-        xlabel="$x$ (m)",
-        ylabel="$z$ (m)",
+        xlabel=f"$x$ ({result['x'].unit})",
+        ylabel=f"$z$ ({result['z'].unit})",
     )
     draw_robot = robot.artist(ax)
-    title = ax.set_title("", loc="left", fontsize=8)
+    title = ax.set_title("", loc="left", fontsize=font_points(8))
 
     def update(row: int) -> None:
         draw_robot(row)
@@ -102,6 +122,16 @@ def walk_stage(
             ax.set_xlim(x[row] - margin, x[row] + margin)
 
     return update
+
+
+def robot_limits(
+    robot: FlatRobot | SolidRobot, rows: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest and highest (x, z) of a robot at some rows of its walk, at most
+    MEASURED_ROWS of them."""
+    step = -(-len(rows) // MEASURED_ROWS)
+    points = np.concatenate([robot.points(row) for row in rows[::step]])
+    return points.min(0), points.max(0)
 
 
 class FlatRobot:
@@ -117,35 +147,52 @@ class FlatRobot:
         self.gait = scene.gait
         self.t = result["t"].values
         self.pose = np.stack([result[name].values for name in ("x", "z", "pitch")], -1)
-        self.leg = robot.leg(40).points
-        self.belly = robot.belly(8)
+        _, factor = shown_lengths(result)
+        self.leg = factor * robot.leg(40).points
+        belly = robot.belly(8)
+        self.belly = None if belly is None else factor * belly.points
         self.leg_reach = np.abs(self.leg).max()
-        self.hips = [(x, robot.hip_height) for x in robot.hips]
-        leg_ends = [abs(x) + self.leg_reach for x in robot.hips]
-        half_length = getattr(robot, "length", 0.0) / 2
+        self.hips = [(factor * x, factor * robot.hip_height) for x in robot.hips]
+        leg_ends = [abs(x) + self.leg_reach for x, _ in self.hips]
+        half_length = factor * getattr(robot, "length", 0.0) / 2
         self.half_width = max(self.leg_reach, half_length, *leg_ends)
+
+    @property
+    def legs(self) -> list[tuple[int, float]]:
+        """The hip and the phase of every leg."""
+        phases = self.robot.hip_phases
+        return [(hip, phase) for hip in range(len(self.hips)) for phase in phases]
+
+    def outlines(self, row: int) -> list[np.ndarray]:
+        """Return the outlines (N, 2) of the legs and, if it has one, of the body."""
+        place = self.pose[row, :2]
+        pitch = self.pose[row, 2]
+        found = []
+        for hip, phase in self.legs:
+            offset = (hip * self.robot.hip_phases[-1] + phase) % 1.0
+            turns = self.gait.frequency * self.t[row] + offset
+            centre = rotated(np.array([self.hips[hip]]), pitch) + place
+            angle = pitch + float(self.gait.angle(turns, turns))
+            found.append(rotated(self.leg, angle) + centre)
+        if self.belly is not None:
+            found.append(rotated(self.belly, pitch) + place)
+        return found
+
+    def points(self, row: int) -> np.ndarray:
+        """Return points (N, 2) of its outlines."""
+        return np.concatenate(self.outlines(row))
 
     def artist(self, ax: Axes) -> Callable[[int], None]:
         """Return a function that draws the robot at a row of its walk."""
-        phases = self.robot.hip_phases
-        legs = [(hip, phase) for hip in range(len(self.hips)) for phase in phases]
         lines = []
-        for hip, phase in legs:
+        for hip, phase in self.legs:
             colour = TRIPOD_COLOURS[int((hip + 2 * phase) % 2)]
             lines += ax.plot([], [], color=colour, lw=1.2)
-        (box,) = ax.plot([], [], color="black", lw=1.2)
+        lines += ax.plot([], [], color="black", lw=1.2)
 
         def draw(row: int) -> None:
-            place = self.pose[row, :2]
-            pitch = self.pose[row, 2]
-            for line, (hip, phase) in zip(lines, legs):
-                offset = (hip * phases[-1] + phase) % 1.0
-                turns = self.gait.frequency * self.t[row] + offset
-                centre = rotated(np.array([self.hips[hip]]), pitch) + place
-                angle = pitch + float(self.gait.angle(turns, turns))
-                line.set_data(*(rotated(self.leg, angle) + centre).T)
-            if self.belly is not None:
-                box.set_data(*(rotated(self.belly.points, pitch) + place).T)
+            for line, outline in zip(lines, self.outlines(row)):
+                line.set_data(*outline.T)
 
         return draw
 
@@ -158,10 +205,16 @@ class SolidRobot:
     def __init__(self, result: Result):
         self.view = walking.view(scene_of(result))
         self.states = result["states"].values
-        first = self.view.triangles(self.states[0]).reshape(-1, 3)
+        _, self.factor = shown_lengths(result)
+        first = self.factor * self.view.triangles(self.states[0]).reshape(-1, 3)
         start = [float(result["x"].values[0]), 0.0]
         self.half_width = float(np.abs(first[:, [0, 1]] - start).max())
         self.leg_reach = max(float(np.ptp(first[:, 2])), self.half_width / 4) / 2
+
+    def points(self, row: int) -> np.ndarray:
+        """Return the corners (N, 2) of its triangles from the side."""
+        triangles = self.factor * self.view.triangles(self.states[row])
+        return triangles[..., [0, 2]].reshape(-1, 2)
 
     def artist(self, ax: Axes) -> Callable[[int], None]:
         """Return a function that draws the robot at a row of its walk."""
@@ -174,7 +227,7 @@ class SolidRobot:
         polygons = ax.add_collection(PolyCollection([], lw=1.0))
 
         def draw(row: int) -> None:
-            triangles = self.view.triangles(self.states[row])
+            triangles = self.factor * self.view.triangles(self.states[row])
             # Farther triangles are drawn first.
             order = np.argsort(-triangles[..., 1].mean(1), kind="stable")
             polygons.set_verts(triangles[order][..., [0, 2]])

@@ -85,6 +85,7 @@ class FitMedium(Question):
     ] = None
 
     name: ClassVar[str] = "fit_medium"
+    looks: ClassVar[tuple[str, ...]] = (*Question.looks, "cmap")
     table: ClassVar[tuple[str, ...]] = ("parameter",)
 
     def __post_init__(self) -> None:

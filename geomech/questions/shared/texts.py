@@ -299,9 +299,10 @@ def measurements(path: Path | None, scene: Any, panels: Sequence[str]) -> Any:
 
     if path is None:
         return None
-    if len(panels) > 1:
+    found = read(path, scene, angle=panels == ("theta",))
+    if "value" in found and len(panels) > 1 and {*panels} != {"x", "distance"}:
         raise Refusal(
             "--data FILE contains one quantity",
             instead="choose its panel with --component, such as x",
         )
-    return read(path, scene, angle=panels == ("theta",))
+    return found

@@ -1,6 +1,7 @@
 """The curvature constraint function of a scene, and its integral over the scene's gait;
 of more than two joints its slices, where two joints move."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
@@ -38,6 +39,7 @@ class Ccf(Question):
     stretched: bool = field(default=False, kw_only=True)
 
     name: ClassVar[str] = "ccf"
+    looks: ClassVar[tuple[str, ...]] = (*Question.looks, "unit", "cmap")
     report_above: ClassVar[float] = 1.0
     parallel: ClassVar[bool] = True
 
@@ -170,6 +172,12 @@ class Ccf(Question):
         return Result("ccf", tuple(found), facts)
 
     @staticmethod
+    def ways() -> Iterable[str]:
+        from geomech import plots
+
+        return plots.CCF_STYLES
+
+    @staticmethod
     def headline(result: Result) -> list[str]:
         facts = result.attributes
         return [f"{facts['scene']}: CCF in the frame {facts['frame']}, {facts['sign']}"]
@@ -194,7 +202,11 @@ class Ccf(Question):
         *,
         style: Annotated[
             str,
-            Option("map (coloured, the default), contours or surface", "STYLE"),
+            Option(
+                "map (coloured, the default), contours or surface; after a comma, a "
+                "style of matplotlib",
+                "STYLE",
+            ),
         ] = "map",
         stretch: Annotated[
             bool, Option("stretch shape space so that equal lengths take equal effort")
@@ -210,7 +222,6 @@ class Ccf(Question):
         from geomech.mathematics.systems.base import shape_labels
         from geomech.results.fields import field_of, metric_of, slices_of, stretch_of
         from geomech.results.scenes import scene_of
-        from geomech.studies.estimates.effort import units
 
         if stretch and "stretched_shape" not in result:
             raise Refusal(
@@ -248,7 +259,7 @@ class Ccf(Question):
             )
         options.update(gaits=[scene.gait], error=error)
         if stretch:
-            unit = units(scene.system)["path_length"]
+            unit = result["stretched_shape"].units
             plane = stretch_of(result)
             return plots.stretched_figure(ccf, plane, unit=unit, **options)
         if both:

@@ -1,7 +1,7 @@
 """The local connection of a scene on a grid, as numbers, arrows and files that other
 programs read."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -93,6 +93,7 @@ class Connection(Question):
     drawn: bool = field(default=False, kw_only=True)
 
     name: ClassVar[str] = "connection"
+    looks: ClassVar[tuple[str, ...]] = (*Question.looks, "unit", "cmap")
     report_above: ClassVar[float] = 1.0
     parallel: ClassVar[bool] = True
 
@@ -216,6 +217,12 @@ class Connection(Question):
         return {".mat": write_table}
 
     @staticmethod
+    def ways() -> Iterable[str]:
+        from geomech import plots
+
+        return plots.CONNECTION_STYLES
+
+    @staticmethod
     def headline(result: Result) -> list[str]:
         facts = result.attributes
         about = f"local connection A, xi = A alphadot, in the frame {facts['frame']}"
@@ -244,7 +251,12 @@ class Connection(Question):
         result: Result,
         *,
         style: Annotated[
-            str, Option("arrows (quiver, the default) or streamlines", "STYLE")
+            str,
+            Option(
+                "arrows (quiver, the default) or streamlines; after a comma, a style "
+                "of matplotlib",
+                "STYLE",
+            ),
         ] = "quiver",
         component: Panels = (),
         clim: ColourLimit = None,

@@ -59,6 +59,7 @@ class Displacement(Question):
     gait: "Gait | None" = field(default=None, kw_only=True)
 
     name: ClassVar[str] = "displacement"
+    looks: ClassVar[tuple[str, ...]] = (*Question.looks, "unit")
     table: ClassVar[tuple[str, ...]] = ("tier", "amplitude")
     parallel: ClassVar[bool] = True
 
@@ -181,7 +182,10 @@ class Displacement(Question):
         component: CurvePanels = (),
         data: Annotated[
             Any,
-            Option("points to draw, in columns amplitude,value,error", "FILE.csv"),
+            Option(
+                "points to draw, such as amplitude,value,error or amplitude,x,y",
+                "FILE.csv",
+            ),
         ] = None,
         ax: Any = None,
         quantity: str = "net_distance",
@@ -190,12 +194,12 @@ class Displacement(Question):
 
         On Axes that are given draw one quantity; return the Axes."""
         from geomech import plots
-        from geomech.results.scenes import scene_of
 
         if ax is not None:
             return plots.displacement(result, ax=ax, quantity=quantity, data=data)
-        if isinstance(data, str):
-            data = measured_points(data, scene_of(result), component)
+        if isinstance(component, str):
+            component = (component,)
+        data = shown_points(data, result, component)
         name = result.attributes["scene"]
         return plots.displacement_figure(
             {name: result}, components=component, data=data
@@ -210,6 +214,21 @@ def measured_points(data: Any, scene: Any, component: Sequence[str]) -> Any:
     if not isinstance(data, str | Path):
         return data
     return measurements(Path(data), scene, tuple(component))
+
+
+def shown_points(data: Any, result: Result, component: Sequence[str]) -> Any:
+    """Return measurements to be drawn next to a result, in its unit of length."""
+    from pathlib import Path
+
+    from geomech.results.lengths import shown_lengths
+    from geomech.results.scenes import scene_of
+    from geomech.scenes.data.measurements import scaled
+
+    if not isinstance(data, str | Path):
+        return data
+    columns = measured_points(data, scene_of(result), component)
+    _, factor = shown_lengths(result)
+    return scaled(columns, factor, angle=tuple(component) == ("theta",))
 
 
 def without_undefined(result: Result) -> Result:

@@ -40,6 +40,7 @@ class Forces(Question):
     frequency: Annotated[float | None, Option("cycles per second", "HZ")] = None
 
     name: ClassVar[str] = "forces"
+    looks: ClassVar[tuple[str, ...]] = (*Question.looks, "cmap")
     table: ClassVar[tuple[str, ...]] = ("phase", "s")
 
     @property

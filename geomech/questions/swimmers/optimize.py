@@ -77,6 +77,7 @@ class Optimize(Question):
     stretched: bool = field(default=False, kw_only=True, compare=False)
 
     name: ClassVar[str] = "optimize"
+    looks: ClassVar[tuple[str, ...]] = (*Question.looks, "unit", "cmap")
     parallel: ClassVar[bool] = True
 
     @property

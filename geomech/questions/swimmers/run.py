@@ -15,6 +15,7 @@ from geomech.questions.swimmers.displacement import (
     Displacement,
     amplitude_words,
     measured_points,
+    shown_points,
     tier_words,
 )
 from geomech.runs.cost import Cost
@@ -32,7 +33,11 @@ DEFAULT = "three-link-glass"
 HELP = "built-in name or TOML file"
 
 Data = Annotated[
-    Any, Option("points to draw, in columns amplitude,value,error", "FILE.csv")
+    Any,
+    Option(
+        "points to draw, such as amplitude,value,error or amplitude,x,y",
+        "FILE.csv",
+    ),
 ]
 
 
@@ -53,6 +58,7 @@ class Run(Question):
     ]
 
     name: ClassVar[str] = "run"
+    looks: ClassVar[tuple[str, ...]] = (*Question.looks, "unit", "cmap")
     table: ClassVar[tuple[str, ...]] = ("tier", "amplitude")
     parallel: ClassVar[bool] = True
     folder: ClassVar[bool] = True
@@ -124,11 +130,11 @@ class Run(Question):
     def draw(result: Result, *, component: Panels = (), data: Data = None) -> Any:
         """Draw displacements against amplitude, a row a gait; return the Figure."""
         from geomech import plots
-        from geomech.results.scenes import scene_of
         from geomech.studies.report import gait_tables
 
-        if isinstance(data, str):
-            data = measured_points(data, scene_of(result), component)
+        if isinstance(component, str):
+            component = (component,)
+        data = shown_points(data, result, component)
         return plots.displacement_figure(
             gait_tables(result), components=component, data=data
         )
@@ -152,8 +158,8 @@ class Run(Question):
         shapes = report.connection_only(result)
         if "A" in shapes:
             save(shapes, folder / FIELD)
-            save_maps(result, folder, component, clim)
-        figure = Run.draw(result, component=component, data=data)
+            save_maps(in_shown_unit(result), folder, component, clim)
+        figure = result.plot(component=component, data=data)
         save_figure(figure, folder / "displacement")
         save(report.displacements_only(result), folder / TABLES)
         write_text(folder / SCENE, toml(scene_of(result)))
@@ -185,6 +191,17 @@ def save_maps(result: Result, folder: Path, component: Any, clim: Any) -> None:
     if "frame_pose" in result and scene.system.joints == 2:
         frame, _ = field_of(result, "frame_pose")
         save_figure(plots.frame_figure(frame, labels=labels), folder / "frame")
+
+
+def in_shown_unit(result: Result) -> Result:
+    """Return the result in the unit of length of the look in use."""
+    from geomech.plots.look import current
+    from geomech.results.lengths import in_lengths
+
+    unit = current().unit
+    if unit is None:
+        return result
+    return in_lengths(result, unit)
 
 
 def save_figure(figure: Any, stem: Path) -> None:

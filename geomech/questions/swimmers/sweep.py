@@ -41,6 +41,7 @@ class Sweep(Question):
     partial: Path | None = field(default=None, kw_only=True, compare=False)
 
     name: ClassVar[str] = "sweep"
+    looks: ClassVar[tuple[str, ...]] = (*Question.looks, "unit", "cmap")
     parallel: ClassVar[bool] = True
 
     @cached_property

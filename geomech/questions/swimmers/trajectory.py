@@ -43,6 +43,7 @@ class Trajectory(Question):
     filmed: bool = field(default=False, kw_only=True, compare=False)
 
     name: ClassVar[str] = "trajectory"
+    looks: ClassVar[tuple[str, ...]] = (*Question.looks, "unit", "cmap")
     table: ClassVar[tuple[str, ...]] = ("phase",)
 
     @property

@@ -26,6 +26,7 @@ class Intrude(Question):
     scene: Annotated["Intruding", Subject(loading.load_intruder, names.intruder_names)]
 
     name: ClassVar[str] = "intrude"
+    looks: ClassVar[tuple[str, ...]] = (*Question.looks, "cmap")
     table: ClassVar[tuple[str, ...]] = ("t",)
     unlimited: ClassVar[bool] = True  # it takes seconds at most
 

@@ -32,6 +32,7 @@ class Stress(Question):
     drawn: bool = field(default=True, kw_only=True)
 
     name: ClassVar[str] = "stress"
+    looks: ClassVar[tuple[str, ...]] = (*Question.looks, "cmap")
 
     def inputs(self) -> list[Path]:
         return [Path(self.medium)]

@@ -48,6 +48,7 @@ class Walk(Question):
     ] = None
 
     name: ClassVar[str] = "walk"
+    looks: ClassVar[tuple[str, ...]] = (*Question.looks, "unit")
     table: ClassVar[tuple[str, ...]] = ("t",)
 
     def check(self) -> None:

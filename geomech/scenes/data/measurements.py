@@ -17,19 +17,31 @@ from geomech.scenes.model import Scene
 from rft.core.checks import unmasked
 from rft.core.refusal import Refusal, located
 
-COLUMNS = ("amplitude", "value", "error")
+LENGTHS = ("x", "y", "net_distance")  # quantities that are lengths
+QUANTITIES = (*LENGTHS, "heading")
+COLUMNS = (
+    "amplitude",
+    "value",
+    "error",
+    *QUANTITIES,
+    *(f"{name}_error" for name in QUANTITIES),
+)
+SYNONYMS = {"distance": "net_distance", "theta": "heading"}
 ANGLES = {"": 1.0, "rad": 1.0, "deg": math.pi / 180}
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 HEADER = "amplitude,value,error"
+NAMED_HEADER = "amplitude,x,x_error,net_distance,net_distance_error"
 
 
 def read(path: str | Path, scene: Scene, angle: bool = False) -> dict[str, np.ndarray]:
-    """Return amplitude, value and error (N,) of measured displacements per cycle, in
-    the units of the scene's results.
+    """Return columns (N,) of measured displacements per cycle, in the units of the
+    scene's results.
 
-    The header has the columns amplitude and value, and optionally error, in any order.
-    A name may have another unit, as amplitude_deg, value_mm or error_BL. angle: values
-    are headings. Refusal, with the line, for any other file."""
+    The header has the columns amplitude and value, and optionally error, in any order;
+    or, in place of value, some of x, y, net_distance (or distance) and heading, each
+    with its error, such as x_error. A name may have another unit, as amplitude_deg,
+    value_mm or x_error_BL. angle: values are headings. Refusal, with the line, for any
+    other file."""
     source = rows.read(path, LARGEST_FILE, f"give a CSV file with the header {HEADER}")
     length = body_size(scene.system)
     in_angles = "amplitude" in angles_of(type(scene.gait))
@@ -44,9 +56,9 @@ def read(path: str | Path, scene: Scene, angle: bool = False) -> dict[str, np.nd
         )
     source.issue()
     columns = {name: scales[name] * x for name, x in zip(scales, table.T)}
-    if "error" in columns:
-        is_negative = columns["error"] < 0
-        if is_negative.any():
+    for name in columns:
+        is_negative = columns[name] < 0
+        if name.endswith("error") and is_negative.any():
             line = source.lines[is_negative.argmax()]
             raise Refusal(
                 "an error must not be negative", where=f"{source.name}, line {line}"
@@ -55,10 +67,10 @@ def read(path: str | Path, scene: Scene, angle: bool = False) -> dict[str, np.nd
 
 
 def converted(data: Mapping, units: dict[str, dict[str, float]]) -> dict:
-    """Return amplitude, value and error (N,) of measurements in a table. Its columns
-    have the names of those of a file; error may be missing, and others are ignored.
-    Refusal for other names."""
-    words = [x for x in data if str(x).lower().startswith(COLUMNS)]
+    """Return columns (N,) of measurements in a table. Its columns have the names of
+    those of a file; errors may be missing, and others are ignored. Refusal for a table
+    without measurements."""
+    words = [x for x in data if column_of(str(x))[0] in COLUMNS]
     scales = _scales([str(x) for x in words], units, "data", "the table")
     columns = {}
     for (name, scale), word in zip(scales.items(), words):
@@ -77,11 +89,67 @@ def units_of(
     if in_angles:
         amplitude = ANGLES
     value = {"": 1.0, "BL": length}
-    if unit == "m":
-        value |= METRES
+    if unit in METRES:
+        value |= {name: size / METRES[unit] for name, size in METRES.items()}
+    named = dict.fromkeys(LENGTHS, value) | {"heading": ANGLES}
+    errors = {f"{name}_error": found for name, found in named.items()}
     if angle:
         value = ANGLES
-    return {"amplitude": amplitude, "value": value, "error": value}
+    return {"amplitude": amplitude, "value": value, "error": value, **named, **errors}
+
+
+def points_of(
+    columns: Mapping[str, np.ndarray], quantity: str, value_of: Sequence[str]
+) -> dict[str, np.ndarray] | None:
+    """Return amplitude, value and, if there is one, error (N,) of the measurements of a
+    quantity; None without any.
+
+    The net distance follows from x and y if both are there. value_of: quantities that a
+    column value stands for, of the net distance by its size."""
+    amplitude = columns["amplitude"]
+    if quantity in columns:
+        value = columns[quantity]
+        error = columns.get(f"{quantity}_error")
+    elif quantity == "net_distance" and "x" in columns and "y" in columns:
+        x, y = columns["x"], columns["y"]
+        value = np.hypot(x, y)
+        error = None
+        if "x_error" in columns and "y_error" in columns:
+            length = np.where(value > 0, value, 1.0)
+            parts = (x * columns["x_error"], y * columns["y_error"])
+            error = np.hypot(*parts) / length
+    elif "value" in columns and quantity in value_of:
+        value = columns["value"]
+        error = columns.get("error")
+        if quantity == "net_distance":
+            value = np.abs(value)
+    else:
+        return None
+    found = {"amplitude": amplitude, "value": value}
+    if error is not None:
+        found["error"] = error
+    return found
+
+
+def scaled(
+    columns: Mapping[str, np.ndarray], factor: float, angle: bool
+) -> dict[str, np.ndarray]:
+    """Return columns with their lengths times a factor. angle: values are headings."""
+    found = {}
+    for name, values in columns.items():
+        is_value = name in ("value", "error") and not angle
+        is_length = name.removesuffix("_error") in LENGTHS
+        found[name] = factor * values if is_value or is_length else values
+    return found
+
+
+def column_of(word: str) -> tuple[str, str]:
+    """Return the column that a word of a header names, and its unit."""
+    name, unit = split_unit(word)
+    name = plain(name).lower()
+    ending = "_error" if name.endswith("_error") else ""
+    quantity = name.removesuffix(ending)
+    return SYNONYMS.get(quantity, quantity) + ending, unit
 
 
 def _scales(
@@ -92,13 +160,20 @@ def _scales(
     Refusal."""
     scales: dict[str, float] = {}
     for word in words:
-        name, unit = split_unit(word)
-        name = plain(name).lower()
+        name, unit = column_of(word)
         if name not in COLUMNS or name in scales:
-            raise Refusal(f"the header must be {HEADER}", value=word, where=place)
+            raise Refusal(
+                f"the header must be {HEADER}",
+                value=word,
+                where=place,
+                instead=f"or name quantities, such as {NAMED_HEADER}",
+            )
         with located(place):
             scales[name] = _scale(name, unit, units[name], owner)
-    if not {"amplitude", "value"} <= {*scales}:
+    measured = {"value", *QUANTITIES} & {*scales}
+    errors = {name for name in scales if name.endswith("error")}
+    without = errors - {"error" if x == "value" else f"{x}_error" for x in measured}
+    if "amplitude" not in scales or not measured or without:
         header = ",".join(words)
         raise Refusal(f"the header must be {HEADER}", value=header, where=place)
     return scales
