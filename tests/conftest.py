@@ -22,7 +22,7 @@ TRUTHS = pytest.StashKey()
 COMPILED = pytest.StashKey()
 BY_HAND = {"soak", "benchmark"}
 # Files that look at pictures as they are.
-LAID_OUT = {"test_pictures", "test_figures", "test_shown"}
+LAID_OUT = {"test_figures", "test_look", "test_pictures", "test_shown"}
 
 
 @pytest.fixture

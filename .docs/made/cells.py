@@ -84,7 +84,9 @@ def _code(first: str, content: str) -> str | None:
     if language == "python":
         return content
     if language == "console":
-        return "\n".join(f"!{line.removeprefix('$ ')}" for line in content.splitlines())
+        # A command goes on after a backslash at the end of a line.
+        commands = re.split(r"(?<!\\)\n", content)
+        return "\n".join(f"!{command.removeprefix('$ ')}" for command in commands)
     return None
 
 

@@ -241,7 +241,7 @@ def test_no_medium_of_ours_is_suspected(name):
         ),
         ('"chain"', '"chain"\nlengths = [1, "1", 1]', "give a number instead of '1'"),
         ('"chain"', '"chain"\nlengths = 3', "give a list in [ ] instead of 3"),
-        ('"circle"', '"circle"\nreverse = 1', "give true or false in place of 1"),
+        ('"circle"', '"circle"\nreverse = 1', "give true or false instead of 1"),
         (
             '"circle"',
             '"circle"\ncentre_deg = ["a", 1]',
@@ -250,7 +250,7 @@ def test_no_medium_of_ours_is_suspected(name):
         (
             '"circle"',
             '"circle"\n[numerics]\ngrid = 31.5',
-            "give a whole number without a point in place of 31.5",
+            "give a whole number without a point instead of 31.5",
         ),
         (
             '"circle"',

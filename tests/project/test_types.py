@@ -108,7 +108,7 @@ def test_every_public_class_is_in_the_table():
     public = [*(getattr(rft, name) for name in rft.__all__), *KINDS.values()]
     kinds = {c for c in public if isinstance(c, type)}
     kinds = {c for c in kinds if not getattr(c, "_is_protocol", False)}
-    outputs = {rft.Refusal, rft.Solution, rft.TimeSteps, rft.Work}
+    outputs = {rft.LinkForce, rft.Refusal, rft.Solution, rft.TimeSteps, rft.Work}
     # Without parameters; with a file; with those of body_velocity.
     untried = {Coulomb, Centreline, rft.BodyVelocity}
     assert kinds - outputs - {type(part) for part in PARTS.values()} == untried

@@ -728,7 +728,7 @@ FIXED = """<geom name="slab" type="plane" size="1 1 1"/>
 REFUSED = [
     ({"geoms": "bal"}, "the model has no geom 'bal': did you mean 'ball'"),
     ({"geoms": ["ball", "leg*"]}, "the model has no geom 'leg"),
-    ({"geoms": 5}, r"no geom is in group 5: groups are \[0\]"),
+    ({"geoms": 5}, r"no geom is in group 5: the groups are \[0\]"),
     (
         {"geoms": "slab"},
         "the geom 'slab' is a plane, which is not solid: choose a sphere",
@@ -815,7 +815,7 @@ def test_what_changes_after_attach_is_refused():
     stranger = mujoco.MjData(model_of(MASKED))
     sand = rft.mujoco.attach(model, MAP)
     refused("a Sand cannot be pickled or copied", pickle.dumps, sand)
-    refused("attached to 'ball' already: detach it", rft.mujoco.attach, model, MAP)
+    refused("already attached to 'ball': detach it", rft.mujoco.attach, model, MAP)
     refused("the data belong to another model", sand.forces, stranger)
     model.geom_size[0, 0] = 0.05
     refused("'ball' changed after attach: detach the sand", sand.power, data)

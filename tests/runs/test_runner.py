@@ -20,6 +20,7 @@ from geomech.runs.store import Store
 from geomech.shell import terminal
 from geomech.shell.pipeline import allow
 from geomech.studies.terradynamics import walking
+from rft.balance.listening import listening, no_listener
 
 VISCOUS = scenes.load("three-link-viscous")
 
@@ -131,7 +132,7 @@ def test_no_faster_back_end_is_taken_than_at_first(tmp_path):
 @pytest.mark.parametrize("seconds", [0.1, 50.0])
 def test_assumed_seconds_decide_on_the_back_end_and_no_clock(seconds):
     for assumed, expected in ((1.49, "numpy"), (1.5, backend.fastest())):
-        with backend.preferring("numpy"):
+        with backend.preferring("numpy"), listening(no_listener):
             cost = Cost(1, seconds, 0.0, numpy_seconds=assumed)
             allow(Trajectory(VISCOUS), cost, yes=True)
             assert backend.preferred() == expected

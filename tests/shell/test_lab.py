@@ -31,7 +31,7 @@ from rft.core.refusal import Refusal
 
 pytestmark = [
     pytest.mark.usefixtures("fastest"),
-    pytest.mark.filterwarnings("ignore:.*leaves the polygon"),
+    pytest.mark.filterwarnings("ignore:.*departs from the polygon"),
 ]
 OFF_CENTRE = Circle(amplitude=0.7, centre=(0.3, -0.4))
 ALLOWED = {

@@ -293,7 +293,7 @@ def test_a_run_from_python_fills_a_folder_as_the_command_does(tmp_path):
     assert names[0] == names[1] and "displacement.json" in names[0]
     other = scene.with_numerics(grid=9)
     (tmp_path / "here" / "displacement.json").unlink()
-    with pytest.raises(Refusal, match="another scene stands there"):
+    with pytest.raises(Refusal, match="it holds the results of another scene"):
         geomech.run(other).save(tmp_path / "here")
 
 

@@ -74,7 +74,7 @@ def test_large_requests_are_refused_without_yes(name, large, monkeypatch):
     monkeypatch.setattr(capabilities, "VALUES_TOGETHER", 1 << 15)
     code, out, err = run(*LARGE[name].split())
     assert (code, out) == (2, "")
-    assert "to compute for more than 60 s or 2 GB say --yes" in err
+    assert "to compute for more than 60 s or 2 GB use --yes" in err
     assert {p.name for p in large.iterdir()} == {*LARGE_SCENES}
 
 
@@ -91,7 +91,7 @@ def test_every_question_that_computes_long_is_refused(line, monkeypatch):
     monkeypatch.setattr(run_cost, "LONGEST", 0.0)
     code, _, err = run(*line.split())
     assert code == 2
-    assert "say --yes" in err
+    assert "use --yes" in err
 
 
 def everything():

@@ -381,7 +381,7 @@ SUM = (
             [[1, -1], [0.5, 2]],
             "alpha_3 is 1 alpha_1 - 1 alpha_2, alpha_4 is 0.5 alpha_1 \\+ 2 alpha_2, .* leave alpha_3, alpha_4 out",
         ),
-        (1e-2, [[0.4, -0.3, 1]], "alpha_4 is 0.4 alpha_1 - 0.3 alpha_2 \\+ 1 alpha_3, but"),
+        (1e-2, [[0.4, -0.3, 1]], "alpha_4 is 0.4 alpha_1 - 0.3 alpha_2 \\+ 1 alpha_3, apart"),
     ],
 )  # fmt: skip
 def test_joints_that_follow_from_others_are_named(noise, rows, said):
@@ -530,7 +530,7 @@ def test_the_scene_of_a_field_predicts_its_displacement_and_error(usual, field):
 
 def test_what_the_data_do_not_reach_is_refused(field):
     scene = load(field / "mine.toml")
-    with refused(r"the data do not reach alpha = \(0.2, -0.1\), \d"):
+    with refused(r"the data do not reach alpha = \(0.2, -0.1\), which is \d"):
         scene.system.velocity(np.array([0.2, -0.1]), np.array([1.0, 0.0]))
     with refused(
         "area tier integrates a field, and A is known only near the mean gait"
@@ -565,8 +565,8 @@ def test_lengths_and_signs_of_a_field(usual, field):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda d: d.drop_vars("gait_slope"), "no gait_slope that fits it"),
-        (lambda d: d.assign(gait_beyond=d.gait_beyond.expand_dims("more")), "no gait_beyond that fits it"),
+        (lambda d: d.drop_vars("gait_slope"), "no gait_slope that matches it"),
+        (lambda d: d.assign(gait_beyond=d.gait_beyond.expand_dims("more")), "no gait_beyond that matches it"),
         (lambda d: d.assign(gait_spread=d.gait_spread * (2 * d.joint - 3)), "parts do not match"),
         (lambda d: d.isel(normal=[0, 0]), "parts do not match"),
         (lambda d: d.isel({d.gait_A.dims[-1]: slice(1, None)}), "parts do not match"),
@@ -630,7 +630,7 @@ def late(rows):
         (lambda r: r[: 9 * 30 + 15], "7 full cycles, .*, are too few: give at least 10 in all"),
         (lambda r: r[[*range(100), 101, 100, *range(102, 300)]], "line 103: t = .* comes after .*: sort the rows by time"),
         (changed(0, lambda r: r[0, 0], slice(99, 101)), "line 102: t = .* is given twice: keep one"),
-        (changed(5, lambda r: np.degrees(r[:, 5]) % 360), "line 3: heading jumps by 359.3, a full turn in degrees: add degrees"),
+        (changed(5, lambda r: np.degrees(r[:, 5]) % 360), "line 3: heading jumps by 359.3, a full turn in degrees: say degrees"),
         (changed(2, lambda r: 0.3 - 0.5 * r[:, 1] + noise(r)), "alpha_2 is -0.5 times alpha_1, apart from a constant and noise"),
         (changed(2, lambda r: 0.2 + noise(r)), "alpha_2 does not move beyond its noise: leave it out with columns"),
         (changed(2, lambda r: r[:, 0] / 14 + noise(r)), "alpha_2 drifts from 0.1.* to 0.8.* over the log and oscillates by"),
@@ -643,7 +643,7 @@ def late(rows):
         (changed(3, lambda r: r[:, 3] + 1, [200]), "line 202: x differs by .* from the rows before and after: correct that row"),
         (changed(4, lambda r: r[:, 4] - 1, slice(202, None)), "line 204: y jumps by -1 to this row: the tracking slipped"),
         (changed(0, lambda r: 1e-9 * r[:, 0]), "the joints repeat every .*e-09 where t is in s: give t in s"),
-        (changed(0, lambda r: 100 + r[:, 0] + 0.3 * late(r)), "the joints repeat every 1.01 .* every 1.28 in the last: two"),
+        (changed(0, lambda r: 100 + r[:, 0] + 0.3 * late(r)), "the joints repeat every 1.01 .* every 1.28 in the last: it contains two"),
         (changed(0, lambda r: r[:, 0] + late(r)), "line 33: the gait pauses, slips or runs backwards .*: cut out pauses"),
         (changed(1, lambda r: 0.4 * r[:, 1] - 1, slice(200, None)), "line 202: alpha_1 jumps by .* two gaits"),
         (
@@ -700,12 +700,12 @@ def test_columns_are_known_by_their_names(header, joints, seconds, tmp_path):
         ("t a1 a2 x y yaw theta", "", "line 1: both yaw and theta could be the column heading"),
         ("t a b x y c", "t a b x y d", "line 1: no column 'd'; the columns are 't, a, b, x, y, c'"),
         ("t a x y c", "t a x y c", "columns must list t, two or more joint angles"),
-        ("t a b x y c", "t a a x y c", "columns are those of t"),
+        ("t a b x y c", "t a a x y c", "columns must list t"),
         ("t a1 a2 a3 a4 a5 a6 a7 x y yaw", "", "7 joint angles, more than 6"),
         ("t a1 a2 x_mm y yaw", "", "line 1: x_mm and y have different units"),
-        ("t a1 a2 x_px y_px yaw", "", "line 1: x_px is in px by its name: give x and y in body lengths"),
-        ("t a1 a2 x_N y_N yaw", "", "line 1: x_n is in N by its name"),
-        ("t a1_mm a2_mm x y yaw", "", "line 1: a1_mm is in mm by its name: give angles in rad, or in degrees"),
+        ("t a1 a2 x_px y_px yaw", "", "line 1: the name of x_px gives the unit px: give x and y in body lengths"),
+        ("t a1 a2 x_N y_N yaw", "", "line 1: the name of x_n gives the unit N"),
+        ("t a1_mm a2_mm x y yaw", "", "line 1: the name of a1_mm gives the unit mm: give angles in rad, or in degrees"),
         ("t a1_deg a2 x y yaw", "", "line 1: a2 has no unit, but other joints have one"),
         ("hello", "", "no header of columns: give a CSV file with a header such as t,alpha_1,alpha_2,x,y,heading"),
     ],
@@ -731,9 +731,9 @@ IN_DEGREES = "t a1_deg a2_deg x y heading_deg"
     ("header", "column", "value", "said"),
     [
         ("t a1 a2 x y heading", 1, 6.24, ""),
-        ("t a1 a2 x y heading", 1, -6.34, "line 52: a1 reaches -6.3.* where joint angles are in rad: say degrees"),
+        ("t a1 a2 x y heading", 1, -6.34, "line 52: a1 reaches -6.3.* where joint angles are in rad: add degrees"),
         (IN_DEGREES, 2, 1799.0, ""), (IN_DEGREES, 2, -1805.0, "line 52: a2_deg reaches -1805 degrees: no joint turns that far"),
-        ("t a1 a2 x y heading", 5, 331.0, "line 52: heading jumps by 331, a full turn in degrees: add degrees"),
+        ("t a1 a2 x y heading", 5, 331.0, "line 52: heading jumps by 331, a full turn in degrees: say degrees"),
         ("t a1 a2 x y heading", 5, -389.0, "jumps by 38"), ("t a1 a2 x y heading", 5, 329.0, ""),
         ("t a1 a2 x y heading", 5, 391.0, ""), (IN_DEGREES, 5, 360.0, ""),
     ],

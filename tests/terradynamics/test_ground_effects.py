@@ -184,7 +184,7 @@ def test_the_ground_takes_power_with_all_effects(name, count, tension):
 
 FLAT = OUTLINES["plate"].outline(1)
 REFUSED = [
-    (lambda: Aeration(0.03, 0.03), r"the ground is fluidised from 0\.03 m/s on"),
+    (lambda: Aeration(0.03, 0.03), r"the ground is fluidised from 0\.03 m/s"),
     (lambda: Slope(0.5, 0.5), r"slides by itself.* angle of repose, 28\.6 degrees"),
     (lambda: DisturbedGround((), 0.02, 0.1), "must be"),
     (lambda: ground_of([Aeration(0.01, 0.03)] * 2), "aeration appears twice"),

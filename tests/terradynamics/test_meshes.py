@@ -229,8 +229,8 @@ def test_faces_name_vertices_from_the_first_or_the_last(kind, last, tmp_path):
             "f -3 -2 -1\nv 5 5 5\n",
             "a face counts vertices backwards, but vertices",
         ),
-        ("obj", "f 2 3 5\n", "is no OBJ mesh: 'index 4 is out of bounds"),
-        ("obj", "f 2 3 -5\n", "is no OBJ mesh: 'index -5 is out of bounds"),
+        ("obj", "f 2 3 5\n", "is not a valid OBJ mesh: 'index 4 is out of bounds"),
+        ("obj", "f 2 3 -5\n", "is not a valid OBJ mesh: 'index -5 is out of bounds"),
         ("obj", "f 0//1 2//1 -1//1", "a face names vertex 0, where vertices count"),
     ],
 )

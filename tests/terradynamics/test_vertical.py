@@ -413,7 +413,7 @@ REFUSED = [
         lambda: Polygon(BOWTIE, 0.1),
         r"elements \[0\] and \[2\] of the outline intersect",
     ),
-    (lambda: Polygon(TOUCHES, 0.1), "cross or touch"),
+    (lambda: Polygon(TOUCHES, 0.1), "intersect or touch"),
     (lambda: Spline(LOOP, 0.1), r"elements \[3\] and \[6\] of the outline intersect"),
     (lambda: Polygon([(0, 0), (1, 0), (0.5, 0)], 0.1, closed=False), "turns back onto"),
     (lambda: Rotate(0.02, rate=0.0), "rate must not be 0"),
