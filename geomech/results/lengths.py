@@ -81,7 +81,7 @@ def in_lengths(result: Result, unit: str) -> Result:
     >>> study = geomech.study(geomech.media.Viscous(2.0), chain, circle)
     >>> moved = in_lengths(study.displacement(tiers="direct"), "cm")
     >>> moved["x"].unit, moved["x"].values.round(2).tolist()
-    ('cm', [[0.76]])
+    ('cm', [[-0.77]])
     """
     scene = scene_of(result)
     factor = length_factor(scene, unit)

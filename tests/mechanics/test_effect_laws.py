@@ -23,6 +23,7 @@ from rft import (
     work_done,
 )
 from rft.bodies.pieces import Pieces, subdivide
+from rft.core.refusal import Refusal
 from rft.effects.base import Site
 from rft.effects.contact import NO_MEMORY, assemble
 from rft.formulas.link import Factor, quadratic_load, scaled_load, two_sided_load
@@ -298,3 +299,12 @@ def test_a_towed_sled_by_an_independent_sum_of_forces():
     work = work_done(GLASS, body, *shapes, xi, **towing)
     friction = (force.conj() * velocity).real.sum() + sled.pull * abs(v)
     assert work.bending_moment @ shapes[1] == pytest.approx(friction, rel=1e-4)
+
+
+def test_a_body_on_a_slope_is_refused_from_the_weight_at_which_it_slides():
+    """The drag downhill is sin(repose - angle) / sin(repose) of the level one."""
+    angle, repose = np.radians([20, 30])
+    heaviest = np.sin(repose - angle) / np.sin(repose) / np.sin(angle)
+    Slope(angle=angle, repose=repose, weight=0.99 * heaviest)
+    with pytest.raises(Refusal):
+        Slope(angle=angle, repose=repose, weight=1.01 * heaviest)
