@@ -74,6 +74,8 @@ def write(folder: Path) -> None:
     """Write the page of every package, where its text has changed."""
     folder.mkdir(parents=True, exist_ok=True)
     names = [name for group in PACKAGES.values() for name in group]
+    for page in {*folder.iterdir()} - {folder / f"{name}.rst" for name in names}:
+        page.unlink()  # of a package that is gone
     for name in names:
         page, text = folder / f"{name}.rst", _page(name)
         if not page.exists() or page.read_text(encoding="utf-8") != text:

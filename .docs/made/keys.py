@@ -25,15 +25,18 @@ CONTENTS = {
 }
 
 
+# Before the build runs examples that add kinds.
+SECTIONS = keys.sections()
+
+
 def index() -> str:
     """Return a table of all sections with links to their kinds, and the tree of
     contents that leads to their pages.
 
     Each link has the anchors that its kind had when all keys were on this page."""
-    sections = keys.sections()
     seen: dict[str, int] = {}
     rows = []
-    for name, parts in sections.items():
+    for name, parts in SECTIONS.items():
         page = f"{_anchors(name, seen)}[{_title(name)}](/generated/keys/{name}.md)"
         kinds = []
         for part in parts:
@@ -42,7 +45,7 @@ def index() -> str:
                 link = f"[{_words(part)}](#{_target(name, part)})"
             kinds.append(_anchors(part.title, seen) + link)
         rows.append(f"| {page} | {CONTENTS[name]} | {', '.join(kinds)} |")
-    tree = "\n".join(f"/generated/keys/{name}" for name in sections)
+    tree = "\n".join(f"/generated/keys/{name}" for name in SECTIONS)
     return (
         "| section | contents | kinds |\n|---|---|---|\n"
         + "\n".join(rows)
@@ -53,7 +56,9 @@ def index() -> str:
 def write(folder: Path) -> None:
     """Write the page of every section, where its text has changed."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, parts in keys.sections().items():
+    for page in {*folder.iterdir()} - {folder / f"{name}.md" for name in SECTIONS}:
+        page.unlink()  # of a section that is gone
+    for name, parts in SECTIONS.items():
         page, text = folder / f"{name}.md", _page(name, parts)
         if not page.exists() or page.read_text(encoding="utf-8") != text:
             page.write_text(text, encoding="utf-8")
