@@ -70,29 +70,19 @@ def function_of_scene(
     return ask
 
 
-def function_of_file(
-    question: Callable[Concatenate[Any, Fields], Question],
+def function_of(
+    subject: str, question: Callable[Concatenate[Any, Fields], Question]
 ) -> Callable[Concatenate[Any, Fields], Result]:
-    """Return the function that asks a question of measurements, mostly of a file."""
+    """Return the function that asks a question of what is no scene: a file of
+    measurements, or a medium by its name or file.
 
-    def ask(file: Any, *values: Fields.args, **options: Fields.kwargs) -> Result:
+    subject: name of the function's first parameter."""
+
+    def ask(about: Any, *values: Fields.args, **options: Fields.kwargs) -> Result:
         refuse_unknown(question, options)
-        return question(file, *values, **options).ask()
+        return question(about, *values, **options).ask()
 
-    describe(ask, question, "file")
-    return ask
-
-
-def function_of_medium(
-    question: Callable[Concatenate[Any, Fields], Question],
-) -> Callable[Concatenate[Any, Fields], Result]:
-    """Return the function that asks a question of a medium, by name or file."""
-
-    def ask(medium: Any, *values: Fields.args, **options: Fields.kwargs) -> Result:
-        refuse_unknown(question, options)
-        return question(medium, *values, **options).ask()
-
-    describe(ask, question, "medium")
+    describe(ask, question, subject)
     return ask
 
 
@@ -312,7 +302,7 @@ intrude = function_of_scene(Intrude)
 walk = function_of_scene(Walk)
 grains = function_of_scene(Grains)
 # Of measurements, of a medium, and of options alone.
-fit_medium = function_of_file(FitMedium)
-fit_gait = function_of_file(FitGait)
-stress = function_of_medium(Stress)
+fit_medium = function_of("file", FitMedium)
+fit_gait = function_of("file", FitGait)
+stress = function_of("medium", Stress)
 drag_grains = function_of_options(DragGrains)
