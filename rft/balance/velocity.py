@@ -243,25 +243,8 @@ class BodyVelocity:
         compiled = solves_compiled(self._backend, self._assembly.law)
         if self._chain is not None and compiled and guess is None and size:
             found = self._of_chain(alpha, alphadot)
-        elif size <= SAMPLES_TOGETHER:
-            found = self._solution(self._assembly, alpha, alphadot, guess)
         else:
-            found = Solution(
-                np.empty((size, 3)),
-                np.empty(size),
-                np.empty(size, np.uint8),
-                np.empty(size, np.int32),
-            )
-            for first in range(0, size, SAMPLES_TOGETHER):
-                part = slice(first, first + SAMPLES_TOGETHER)
-                part_guess = None
-                if guess is not None:
-                    part_guess = guess[:, part]
-                solution = self._solution(
-                    self._assembly.take(part), alpha[part], alphadot[part], part_guess
-                )
-                for whole, values in zip(found, solution):
-                    whole[part] = values
+            found = self._solution_in_parts(alpha, alphadot, guess)
         return Solution(
             found.xi.reshape(*batch, 3), *[x.reshape(batch) for x in found[1:]]
         )
@@ -273,9 +256,35 @@ class BodyVelocity:
         found = Solution(*fields)
         if unsolved:
             i = np.flatnonzero(found.code == UNCONVERGED)
-            rest = self._solution(self._assembly, alpha[i], alphadot[i], None)
+            rest = self._solution_in_parts(alpha[i], alphadot[i], None)
             for whole, values in zip(found, rest):
                 whole[i] = values
+        return found
+
+    def _solution_in_parts(
+        self, alpha: np.ndarray, alphadot: np.ndarray, guess: np.ndarray | None
+    ) -> Solution:
+        """Return the solution at shapes and rates (B, joints) from guesses (3, B) in
+        body lengths, of `SAMPLES_TOGETHER` samples at a time."""
+        size = len(alpha)
+        if size <= SAMPLES_TOGETHER:
+            return self._solution(self._assembly, alpha, alphadot, guess)
+        found = Solution(
+            np.empty((size, 3)),
+            np.empty(size),
+            np.empty(size, np.uint8),
+            np.empty(size, np.int32),
+        )
+        for first in range(0, size, SAMPLES_TOGETHER):
+            part = slice(first, first + SAMPLES_TOGETHER)
+            part_guess = None
+            if guess is not None:
+                part_guess = guess[:, part]
+            solution = self._solution(
+                self._assembly.take(part), alpha[part], alphadot[part], part_guess
+            )
+            for whole, values in zip(found, solution):
+                whole[part] = values
         return found
 
     def _solution(

@@ -5,7 +5,7 @@ import pytest
 from registry import DRY, MEDIA
 
 from geomech.mathematics import symbolic
-from rft import Chain, EndCaps, Viscous, body_velocity
+from rft import Chain, EndCaps, Granular, Viscous, body_velocity
 from rft.balance import backend, velocity
 from rft.formulas.newton import plus, to_element, to_frame
 from rft.laws.base import TermLaw
@@ -145,3 +145,16 @@ def test_large_batches_are_solved_in_parts(monkeypatch):
         parts = body_velocity(*motion, effects=(caps,), **more)
         np.testing.assert_allclose(parts.xi, whole.xi, rtol=0, atol=1e-9)
         assert (parts.status == whole.status).all()
+
+
+@pytest.mark.usefixtures("compiled_code")
+def test_folds_that_compiled_code_leaves_are_solved_in_parts(monkeypatch):
+    """One descent does not reach the solutions of this law near this shape."""
+    rng = np.random.default_rng(8)
+    law = Granular(8.0, np.radians(35.0))
+    alpha = (-1.47053323, -1.9356507) + 1e-3 * rng.normal(size=(40, 2))
+    motion = law, Chain(), alpha, (-0.99735926, -0.07262584)
+    whole = body_velocity(*motion, backend="numba").checked()
+    monkeypatch.setattr(velocity, "SAMPLES_TOGETHER", 1)
+    parts = body_velocity(*motion, backend="numba").checked()
+    np.testing.assert_allclose(parts.xi, whole.xi, rtol=0, atol=1e-12)
