@@ -102,6 +102,20 @@ def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
                     )
 
 
+def _resolved(path: str | Path) -> Path:
+    """Return a path without its links; OSError if they go round in a circle."""
+    try:
+        target = Path(path).resolve()
+    except RuntimeError:  # before Python 3.13, which leaves such links as they are
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP)) from None
+    try:
+        target.stat()
+    except OSError as error:
+        if error.errno == errno.ELOOP:
+            raise
+    return target
+
+
 @contextlib.contextmanager
 def atomic_file(path: str | Path) -> Iterator[Path]:
     """Yield a path to write to, with the same name. Its file moves to ``path`` on
@@ -115,12 +129,12 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
         )
 
     try:
-        target = Path(path).resolve()
+        target = _resolved(path)
         if target.exists() and not target.is_file():
             raise OSError("it is not an ordinary file")
         # Within a staging folder the user knows the name alone.
         displayed = target.name if target.parent.name == NEW else path
-    except (OSError, RuntimeError, ValueError) as error:
+    except (OSError, ValueError) as error:
         raise refusal(error) from None
     with _StagingFolder(target, target.parent, refusal) as new:
         try:
@@ -151,11 +165,11 @@ def atomic_folder(path: str | Path, inputs: Iterable[Path] = ()) -> Iterator[Pat
         )
 
     try:
-        target = Path(path).resolve()
+        target = _resolved(path)
         if os.path.lexists(target) and not target.is_dir():
             raise OSError("it is not a folder")
         existing = next(p for p in (target, *target.parents) if p.exists())
-    except (OSError, RuntimeError, ValueError) as error:
+    except (OSError, ValueError) as error:
         raise refusal(error) from None
     with _StagingFolder(target, existing, refusal) as new:
         try:

@@ -18,6 +18,7 @@ most.
 from __future__ import annotations
 
 import contextlib
+import enum
 import importlib
 import inspect
 import itertools
@@ -407,6 +408,8 @@ def defaults(module) -> Iterator[str]:
             parts = {"": x} | {
                 f".{k}": getattr(x, k) for k in methods if not k.startswith("_")
             }
+            if isinstance(x, enum.EnumMeta):
+                del parts[""]  # arguments that differ between versions of Python
             for part, f in parts.items():
                 some = inspect.signature(f).parameters.values() if callable(f) else ()
                 if found := [
