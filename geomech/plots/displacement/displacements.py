@@ -103,7 +103,7 @@ def displacement(
         centre = variable.values[best] + _medium_shift(result, quantity)
         medium_band(ax, places[-1], centre, variable.spread[best])
     if data is not None:
-        _draw_measurements(ax, data)
+        draw_measurements(ax, data["amplitude"], data["value"], data.get("error"))
 
     if not span:
         ends = amplitudes + [-SINGLE_SPAN / 2, SINGLE_SPAN / 2]
@@ -204,12 +204,13 @@ def medium_band(ax: Axes, x: Any, values: Any, error: Any) -> None:
     ax.fill_between(x, low, high, facecolor=face, edgecolor=MEDIUM_EDGE, lw=0.8, **look)
 
 
-def _draw_measurements(ax: Axes, data: Mapping) -> None:
-    """Draw measurements as points with bars of their errors, if they have any."""
+def draw_measurements(ax: Axes, x: Any, value: Any, error: Any = None) -> None:
+    """Draw measurements (N,) over x as points with bars of their errors, if they have
+    any."""
     ax.errorbar(
-        data["amplitude"],
-        data["value"],
-        data.get("error"),
+        x,
+        value,
+        error,
         label=MEASURED,
         zorder=4,
         fmt="D",
