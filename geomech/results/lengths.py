@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,10 @@ from geomech.results.length_units import UNITS, own_unit
 from geomech.results.scenes import scene_of
 
 LENGTHS = ("body_length",)  # attributes that are lengths
+# A unit of products and at most one quotient, such as drag x BL/rad.
+PLAIN = re.compile(r"[\w^]+((?: x | )[\w^]+)*(/[\w^]+((?: x | )[\w^]+)*)?")
+# The units of x and y, and of theta, of a variable over components.
+BY_COMPONENT = re.compile(r"(\S+) \(x, y\), (\S+) \(theta\)(.*)")
 FACTS = ("shown_unit", "shown_factor")  # attributes of a result in another unit
 
 
@@ -69,6 +74,9 @@ def converted(variable: Variable, own: str, unit: str, factor: float) -> Variabl
     own: unit of lengths in the variable's unit, such as m in m/s."""
     parts: Unit = variable.unit
     if isinstance(parts, str):
+        by_component = BY_COMPONENT.fullmatch(parts)
+        if by_component is not None and "component" in variable.dims:
+            return _converted_components(variable, by_component, own, unit, factor)
         shown, power = unit_with(parts, own, unit)
         if not power:
             return variable
@@ -76,9 +84,30 @@ def converted(variable: Variable, own: str, unit: str, factor: float) -> Variabl
     shown_parts, powers = zip(*(unit_with(part, own, unit) for part in parts))
     if not any(powers):
         return variable
-    factors = factor ** np.array(powers, float)
-    shape = (-1, *[1] * (variable.values.ndim - 1))
-    return variable.with_arrays(lambda x: factors.reshape(shape) * x, unit=shown_parts)
+    return _scaled(variable, 0, factor, powers, shown_parts)
+
+
+def _converted_components(
+    variable: Variable, units: re.Match, own: str, unit: str, factor: float
+) -> Variable:
+    """Return a variable over components x, y and theta, such as rows of A, with the
+    lengths of x and y in another unit."""
+    position, position_power = unit_with(units[1], own, unit)
+    heading, heading_power = unit_with(units[2], own, unit)
+    powers = (position_power, position_power, heading_power)
+    shown = f"{position} (x, y), {heading} (theta){units[3]}"
+    axis = variable.dims.index("component")
+    return _scaled(variable, axis, factor, powers, shown)
+
+
+def _scaled(
+    variable: Variable, axis: int, factor: float, powers: Sequence[int], unit: Unit
+) -> Variable:
+    """Return a variable times powers of a factor, one for each place of an axis."""
+    shape = [1] * variable.values.ndim
+    shape[axis] = -1
+    factors = (factor ** np.array(powers, float)).reshape(shape)
+    return variable.with_arrays(lambda x: factors * x, unit=unit)
 
 
 def unit_with(text: str, own: str, unit: str) -> tuple[str, int]:
@@ -91,6 +120,8 @@ def unit_with(text: str, own: str, unit: str) -> tuple[str, int]:
     >>> unit_with("drag/BL", "BL", "cm"), unit_with("m/rad2", "m", "mm")
     (('drag/cm', -1), ('mm/rad2', 1))
     """
+    if not PLAIN.fullmatch(text):
+        return text, 0
     numerator, slash, denominator = text.partition("/")
     above = re.split(r"( x | )", numerator)
     below = re.split(r"( x | )", denominator)

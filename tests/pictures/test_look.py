@@ -16,6 +16,7 @@ from matplotlib.collections import QuadMesh
 import geomech
 from geomech import plots
 from geomech.results.lengths import in_lengths
+from geomech.studies.measured import synthetic
 
 COLUMN = "3.4in"
 ONE_OF_A_KIND = [  # others have more panels of the same
@@ -402,3 +403,17 @@ def test_lengths_of_every_kind_have_the_unit_that_is_asked_for(ask, name, unit, 
 def test_a_command_prints_the_unit_that_it_draws():
     status, printed, _ = command("intrude", "c-leg", "--unit", "cm")
     assert status == 0 and "N cm" in printed
+
+
+def test_rows_of_a_measured_connection_have_their_own_units(tmp_path):
+    gait = geomech.gaits.Circle(0.8)
+    velocity = geomech.load("three-link-viscous").system.velocity
+    log = synthetic.synthetic_log(velocity, gait, cycles=20, seed=1)
+    synthetic.save(tmp_path / "log.csv", log)
+    text = (tmp_path / "log.csv").read_text().replace(",x,y,", ",x_m,y_m,", 1)
+    (tmp_path / "log.csv").write_text(text)
+    fitted = geomech.fit_gait(tmp_path / "log.csv", body_length=1.0, harmonics=2)
+    A = fitted["gait_A"].values
+    shown = in_lengths(fitted, "mm")["gait_A"]
+    np.testing.assert_allclose(shown.values[:2], 1e3 * A[:2])
+    np.testing.assert_array_equal(shown.values[2], A[2])

@@ -44,7 +44,7 @@ def write_scene(path: Path, result: Result, *, field: Path | None = None) -> Non
 
 
 NO_SIZE = {  # cures where a measurement has no absolute size, by its form
-    "log": "name the columns x_m and y_m, or give unit BL",
+    "log": "name the columns x_m and y_m and give ``body_length``, or give unit BL",
     "midlines": "give the mm per pixel as ``scale`` or the unit as ``units``, or unit "
     "BL",
 }
@@ -213,7 +213,8 @@ class FitGait(Question):
         found = self.measurements
         in_metres = getattr(found, "unit", "") == "m"
         if self.form == "log":
-            in_metres = getattr(found, "metres", False)
+            has_length = self.body_length is not None
+            in_metres = has_length and getattr(found, "metres", False)
         if in_metres or unit == "BL":
             return
         raise Refusal(
@@ -273,8 +274,9 @@ class FitGait(Question):
         from geomech.results.length_units import Lengths
 
         if result.attributes["form"] == "log":
-            own = result.attributes["length_unit"]
-            return Lengths({own: 1.0 if own == "m" else None})
+            if result.attributes["length_unit"] != "m":
+                return Lengths({"BL": None})
+            return Lengths({"m": 1.0}, float(result.attributes["body_length"]))
         body = result["body_length"]
         if body.unit != "m":
             return Lengths({"BL": None})
