@@ -17,6 +17,7 @@ from geomech.mathematics.tiers import TIERS, Tier
 from geomech.plots.look import current, font_points
 from geomech.plots.style import axes_of, figure, shared_legend, styled
 from geomech.scenes.data.measurements import converted, points_of, units_of
+from geomech.scenes.model import Scene
 from geomech.studies.displacement.variables import QUANTITIES, pose_quantities
 from rft.core.refusal import printable
 
@@ -29,6 +30,7 @@ MEDIUM_COLOUR = "#E69F00"  # of the area of a medium's uncertainty
 MEDIUM_EDGE = "#A66F00"
 ERROR = "estimated error, in the tier's colour"
 MEDIUM = "medium, one standard deviation"
+UNNAMED = Scene.name  # of a scene from parts
 MEASURED = "measured"
 PANELS = {  # quantities by the words of --component
     "x": "x",
@@ -279,7 +281,9 @@ def displacement_figure(
         title = printable(name)
         if "note" in table.attributes:
             title = f"{title} (not in the scene)"
-        if len(tables) > 1 or current().inches is None:  # a page has its caption
+        # A page has its caption, and a scene of parts from Python has no name.
+        is_named = current().inches is None and name != UNNAMED
+        if len(tables) > 1 or is_named:
             row[0].set_title(title, loc="left")
         frequency = table.attributes.get("frequency")
         if frequency and panels[-1] == "net_distance":
