@@ -26,6 +26,7 @@ extensions = [
     "myst_nb",
     "sphinx_design",
     "sphinx_copybutton",
+    "sphinxcontrib.bibtex",
     "made",
 ]
 exclude_patterns = ["made/**", "generated/notebooks/**"]
@@ -47,6 +48,8 @@ numpydoc_xref_param_type = False
 
 myst_enable_extensions = ["colon_fence", "deflist", "attrs_block"]
 myst_heading_anchors = 4
+bibtex_bibfiles = ["paper.bib"]
+bibtex_default_style = "plain"
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_timeout = 120

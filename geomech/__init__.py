@@ -15,7 +15,7 @@ The questions of a scene are methods of a study as well: study, Study. Other nam
 
 - load, Scene, Swimmer, Numerics, toml: scenes, read, built and written.
 - media, bodies, gaits, effects, systems: the parts of scenes; register adds yours;
-  medium is a stress map of the vertical plane, by name or from a file.
+  medium is a force law or a stress map, by its name or from a file.
 - load_result, best_scene, fitted_medium, fitted_gait: results from files, and the
   scene, medium or gait that a result has found.
 - measured, fit_log: logs and midlines, stage by stage.
@@ -74,7 +74,7 @@ if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech.scenes import load as load
     from geomech.scenes import toml as toml
     from geomech.scenes.kinds import register as register
-    from geomech.scenes.terradynamics.stress import medium as medium
+    from geomech.scenes.read import medium as medium
     from geomech.studies import measured as measured
     from geomech.studies.measured import fit_log as fit_log
     from geomech.studies.mechanics import undulation as undulation
@@ -129,7 +129,7 @@ _OBJECTS = {
     **dict.fromkeys(("best_scene", "fitted_medium"), "geomech.results.scenes"),
     "fitted_gait": "geomech.results.measured",
     **dict.fromkeys(("load", "toml", "Scene", "Numerics"), "geomech.scenes"),
-    "medium": "geomech.scenes.terradynamics.stress",
+    "medium": "geomech.scenes.read",
     "Swimmer": "geomech.mathematics.systems",
     "fit_log": "geomech.studies.measured",
     "register": "geomech.scenes.kinds",

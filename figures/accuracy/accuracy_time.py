@@ -34,7 +34,7 @@ PHASES = (8, 16, 32, 64, 128, 256, 512)
 FEWEST = 32  # phases of an error estimate
 FINE = 6144  # phases of the truth, a multiple of all counts of phases and first phases
 PEERS = {
-    "a loop of fsolve, 20 midpoints a link": (peers.by_fsolve, (8, 16, 32)),
+    "a loop of fsolve, 20 midpoints per link": (peers.by_fsolve, (8, 16, 32)),
     "a plain loop compiled by numba": (None, PHASES),
 }
 TIERS = {

@@ -140,7 +140,7 @@ def samples() -> list[Row]:
     took = in_turn(programs)
     ours = {how: took[how] / len(alpha) for how in backends()}
     problem = "a velocity, three links in loose glass"
-    midpoints = "20 midpoints a link; off by more than 0.01 in {:.0%}"
+    midpoints = "20 midpoints per link; off by more than 0.01 in {:.0%}"
     by_fsolve = [answer[0] for answer in programs["fsolve"]()]
     by_squares = [answer.x for answer in programs["least_squares"]()]
     rows = []

@@ -55,7 +55,7 @@ def table(numbers: dict) -> str:
     heads = (
         "medium",
         "objective",
-        "BL a cycle",
+        "BL per cycle",
         "path length",
         "BL a unit",
         "reach (rad)",

@@ -6,9 +6,10 @@ import difflib
 import math
 import warnings
 from collections.abc import Iterable
+from pathlib import Path
 
 from rft.core.notes import Note
-from rft.core.refusal import Refusal, formatted
+from rft.core.refusal import Refusal, formatted, in_line
 
 
 class UnitWarning(Note):
@@ -35,14 +36,30 @@ def check_angle(name: str, largest: float) -> None:
         )
 
 
-def choose(place: str, word: object, choices: Iterable[str]) -> str:
+def choose(place: str, word: object, choices: Iterable[str], ending: str = "") -> str:
     """Return word if it is one of the choices; Refusal, with the nearest choice, if
-    not."""
+    not.
+
+    ending: of a file that may be named instead, such as ".toml". Where a file differs
+    from the word by its ending alone, the Refusal names the file."""
     choices = list(choices)
     if isinstance(word, str) and word in choices:
         return word
     instead = f"use one of {', '.join(choices)}"
+    if ending:
+        instead = f"{instead}, or a file"
     nearest = difflib.get_close_matches(str(word), choices, 1, 0.5)
     if nearest:
         instead = f"did you mean {nearest[0]!r}?"
+    if ending and isinstance(word, str) and has_file(word + ending):
+        instead = f"did you mean the file {in_line(word + ending)}?"
     raise Refusal(f"{formatted(word)} is unknown", where=place, instead=instead)
+
+
+def has_file(name: str) -> bool:
+    """Return whether there is a file of that name; False for a name that no file may
+    have."""
+    try:
+        return Path(name).is_file()
+    except (OSError, ValueError):  # too long, or with a zero byte
+        return False

@@ -32,7 +32,7 @@ function redraw() {
 function describeScene() {
   const chart = chartOf(), { family } = chart;
   $("about").textContent = visible(chart.about);
-  $("foot").textContent = `geomech ${PAGE.version}. Scene ${visible(chart.name)}, checksum ${chart.checksum}: ${chart.axes.map((axis) => axis.length).join(" × ")} shapes, odd harmonics to ${chart.harmonics.width / 3 - 1}, ${PHASES} phases a cycle.`;
+  $("foot").textContent = `geomech ${PAGE.version}. Scene ${visible(chart.name)}, checksum ${chart.checksum}: ${chart.axes.map((axis) => axis.length).join(" × ")} shapes, odd harmonics to ${chart.harmonics.width / 3 - 1}, ${PHASES} phases per cycle.`;
   $("frame").replaceChildren(...Object.keys(chart.frames).map((name) => new Option(name, name, false, name === state.frame)));
   $("family").hidden = !family;
   if (!family) return;

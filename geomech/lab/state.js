@@ -87,7 +87,7 @@ const withinFamily = ({ values }, x) => Math.min(values[values.length - 1], Math
 
 let addressing;
 
-/** Write the state into the address, at most five times a second. */
+/** Write the state into the address, at most five times per second. */
 function showAddress() {
   clearTimeout(addressing);
   addressing = setTimeout(() => history.replaceState(null, "", "#" + addressOf(state)), 200);

@@ -45,6 +45,7 @@ from geomech.results.fields import Slice
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+COLUMN_WIDTH = 3.5  # in, of a map with its colour bar and labels
 ROW_NAME = -0.72  # in, of the name of a row from its first panel, in a given width
 SHADOW = "dashed: the gait, seen along the joints that are held here"
 
@@ -95,6 +96,7 @@ def connection_figure(
         for c, ax in zip(connections, axes[:, k]):
             draw(c, component, ax=ax, labels=labels, top=top)
     _name_rows(axes, names)
+    _save_width(axes)
     note_zero_components(fig, panels, components, row_name)
     return fig
 
@@ -133,6 +135,7 @@ def plane_connection_figure(
                 top = scale_limit(np.hypot(*connection.A[component][:2]), clim)
             draw(connection, component, ax=ax, labels=pair, top=top)
     _name_rows(axes, [plane_title(plane, labels) for plane in planes])
+    _save_width(axes)
     note_zero_components(fig, panels, components, row_name)
     return fig
 
@@ -140,7 +143,7 @@ def plane_connection_figure(
 def _connection_panels(panels: Sequence[int], rows: int) -> tuple[Any, Any]:
     """Return (Figure, Axes) for these components of some connections."""
     columns = len(panels)
-    width = 0.3 + 3.5 * columns
+    width = 0.3 + COLUMN_WIDTH * columns
     height = 3.0 + 2.7 * (rows - 1)
     return figure(width, height, columns, rows, layout="compressed")
 
@@ -349,6 +352,8 @@ def _draw_rows(
     if style == "map":
         _merge_legends(fig, axes)
     _name_rows(axes, names)
+    if not is_surface:
+        _save_width(axes)
     return fig
 
 
@@ -363,7 +368,7 @@ def _surface_panels(columns: int, rows: int) -> tuple[Any, Any]:
 
 def _map_panels(columns: int, rows: int) -> tuple[Any, Any]:
     """Return (Figure, Axes) of maps."""
-    width = 0.3 + 3.5 * columns
+    width = 0.3 + COLUMN_WIDTH * columns
     height = 3.2 + 2.75 * (rows - 1)
     fig, axes = figure(width, height, columns, rows, layout="compressed")
     # The widest labels of several rows need a margin.
@@ -418,6 +423,27 @@ def _merge_legends(fig: Figure, axes: Any) -> None:
         )
 
 
+def _save_width(axes: Any) -> None:
+    """Leave the width of a page to maps that stand side by side: the panels of a line
+    share the label of y, and the unit of a colour bar stands in the title.
+
+    axes: (rows, columns), of maps whose lines have the same y."""
+    asked = current().inches
+    side_by_side = axes[0, 0].get_gridspec().ncols
+    if asked is None or side_by_side == 1 or asked >= COLUMN_WIDTH * side_by_side:
+        return
+    for ax in axes.flat:
+        if not ax.get_subplotspec().is_first_col():
+            ax.set_ylabel("")
+            ax.tick_params(labelleft=False)
+        for drawn in ax.collections:
+            bar = getattr(drawn, "colorbar", None)
+            if bar is not None:
+                unit = bar.ax.get_ylabel().rpartition(" ")[2]
+                bar.set_label("")
+                ax.set_title(f"{ax.get_title()} {unit}")
+
+
 def _name_rows(axes: Any, names: Sequence[str]) -> None:
     """Write the name of each row at its left."""
     from matplotlib.transforms import ScaledTranslation
@@ -442,4 +468,23 @@ def _name_rows(axes: Any, names: Sequence[str]) -> None:
             look["transform"] = ax.transAxes
             ax.text2D(0.03, 0.5, name, in_layout=False, **look)
         else:
-            ax.text(place, 0.5, name, in_layout=True, **look)
+            ax.add_artist(_row_name(place, name, look))
+
+
+def _row_name(place: float, name: str, look: dict[str, Any]) -> Any:
+    """Return the name of a row as a text that takes room beside its panel alone.
+
+    As for the label of an axis, its length does not count in the layout: a name longer
+    than a map would push the rows apart until no map is left."""
+    from matplotlib.text import Text
+    from matplotlib.transforms import Bbox
+
+    class RowName(Text):
+        def get_tightbbox(self, renderer: Any = None) -> Any:
+            box = super().get_tightbbox(renderer)
+            if box is None:
+                return None
+            middle = (box.y0 + box.y1) / 2
+            return Bbox.from_extents(box.x0, middle - 0.5, box.x1, middle + 0.5)
+
+    return RowName(place, 0.5, name, in_layout=True, clip_on=False, **look)

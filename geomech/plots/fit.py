@@ -21,12 +21,13 @@ if TYPE_CHECKING:
 
     from geomech.plots.look import Look
 
-ROUNDS = 7  # of measuring and changing, at most
+ROUNDS = 9  # of measuring and changing, at most
 GAP = 4.0  # points between texts of neighbours
 LEAST_HEIGHT = 1.15  # in, of a panel
 MOST_ROWS = 4  # of a figure of maps and curves that grows for its maps
 TALLEST_MAP = 1.3  # height over width of a map that the figure's height is made for
 SLACK = 0.08  # in, of empty margins that stay
+OUTER_GAP = 0.1  # in, between panels and a legend or a text of the figure
 SMALLEST = 0.8  # of the size of a text that cannot be wrapped
 INSIDE, BELOW, ABOVE, BESIDE = range(4)  # where a legend of a panel lies
 
@@ -389,10 +390,8 @@ def _set_height(fig: Figure) -> bool:
         return False
     if not has_maps:
         return False
-    box = fig.get_tightbbox()
-    # Empty margins are alike at both ends, next to legends as well.
-    spare_height = 2 * max(height - box.y1, box.y0)
-    spare_width = width - box.width
+    spare_height = _spare_height(fig)
+    spare_width = width - fig.get_tightbbox().width
     if spare_width > 2 * SLACK and spare_height < 2 * SLACK:
         fig.set_figheight(height + 0.7 * rows * spare_width)
         return True
@@ -400,6 +399,27 @@ def _set_height(fig: Figure) -> bool:
         fig.set_figheight(height - spare_height + SLACK)
         return True
     return False
+
+
+def _spare_height(fig: Figure) -> float:
+    """Return the height that is left empty above and below all panels, in: to the ends
+    of the canvas, or to the legends and the texts of the figure."""
+    boxes = [ax.get_tightbbox() for ax in fig.axes if ax.get_visible()]
+    bottom = min(box.y0 for box in boxes if box is not None)
+    top = max(box.y1 for box in boxes if box is not None)
+    lowest = 0.0
+    highest = fig.bbox.height
+    for outer in (*fig.legends, fig._suptitle, fig._supxlabel):  # type: ignore
+        if outer is None or not outer.get_visible():
+            continue
+        box = outer.get_window_extent()
+        gap = OUTER_GAP * fig.dpi
+        if box.y0 > (bottom + top) / 2:
+            highest = min(highest, box.y0 - gap)
+        else:
+            lowest = max(lowest, box.y1 + gap)
+    # Empty margins are alike at both ends.
+    return 2 * max(highest - top, bottom - lowest) / fig.dpi
 
 
 def _keep_inside(fig: Figure) -> None:

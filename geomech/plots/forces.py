@@ -11,7 +11,7 @@ import numpy as np
 from geomech.core.errors import choose
 from geomech.core.variables import Result
 from geomech.plots.maps import colorbar_extend, draw_colours, scale_limit
-from geomech.plots.style import figure, shared_legend, styled
+from geomech.plots.style import figure, shared_legend, styled, with_minus_signs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -180,11 +180,11 @@ def _end_forces(result: Result) -> str:
     for end in ("tail", "head"):
         mean = result[f"{end}_forward"].values.mean()
         if mean:
-            forces.append(f"{end} {mean:.3g}")
+            forces.append(with_minus_signs(f"{end} {mean:.3g}"))
     if not forces:
         return ""
     unit = _unit_label(result["thrust_ends"].unit)
-    return f"\nbesides, on the ends: {', '.join(forces)} {unit}"
+    return f"\nforces on the ends: {', '.join(forces)} {unit}"
 
 
 def _stack(

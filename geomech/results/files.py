@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +16,34 @@ from geomech.io.files import atomic_folder, write_text
 from geomech.results.kinds import kind_of
 from geomech.results.old import translated
 from geomech.results.show import text
-from rft.core.refusal import Refusal
+from rft.core.refusal import Refusal, spell_arguments
 
-to_dict = io.to_dict
-to_xarray = io.to_xarray
 flat = io.flat
+NOTE = "note"  # a variable: lines that name arguments in double backticks
+
+
+def to_dict(result: Result) -> dict[str, Any]:
+    """Return plain data in the layout of `xarray.Dataset.from_dict`."""
+    return io.to_dict(with_plain_notes(result))
+
+
+def to_xarray(result: Result) -> Any:
+    """Return a Dataset of xarray."""
+    return io.to_xarray(with_plain_notes(result))
+
+
+def with_plain_notes(result: Result) -> Result:
+    """Return a result whose notes name arguments without backticks, for files and other
+    programs."""
+    if NOTE not in result:
+        return result
+    variables = []
+    for variable in result.variables:
+        if variable.name == NOTE:
+            lines = [spell_arguments(line) for line in variable.values.tolist()]
+            variable = replace(variable, values=lines)
+        variables.append(variable)
+    return replace(result, variables=tuple(variables))
 
 
 def table_dims(result: Result) -> tuple[str, ...]:
@@ -109,7 +133,7 @@ def save(result: Result, path: Path, **options: Any) -> None:
     folder, such as `run`, also into a folder."""
     kind = kind_of(result)
     if path.suffix or not getattr(kind, "folder", False):
-        writer(path, kind)(path, result, **options)
+        writer(path, kind)(path, with_plain_notes(result), **options)
         return
     inputs: list[Path] = []
     if result.question is not None:

@@ -59,6 +59,15 @@ class Plain:
         """Return lines that stand below the numbers."""
         return []
 
+    @staticmethod
+    def lengths(result: Result) -> Any:
+        """Return the units of its lengths (`geomech.results.length_units.Lengths`), by
+        default those of its scene."""
+        from geomech.results.length_units import scene_lengths
+        from geomech.results.scenes import scene_of
+
+        return scene_lengths(scene_of(result))
+
 
 def kind_of(result: Result) -> Any:
     """Return the class of the question that a result answers."""

@@ -1,76 +1,31 @@
-"""Results in another unit of length, for pictures."""
+"""Results in another unit of length, for pictures and for printing."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from geomech.core.errors import choose
 from geomech.core.variables import Result, Unit, Variable
-from geomech.mathematics.systems.base import body_size, length_unit
+from geomech.results.kinds import kind_of
+from geomech.results.length_units import UNITS, own_unit
 from geomech.results.scenes import scene_of
-from rft.core.refusal import Refusal
 
-METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}  # of a unit
-BODY_LENGTH = "BL"
-UNITS = (*METRES, BODY_LENGTH)
 LENGTHS = ("body_length",)  # attributes that are lengths
+# A unit of products and at most one quotient, such as drag x BL/rad.
+PLAIN = re.compile(r"[\w^]+((?: x | )[\w^]+)*(/[\w^]+((?: x | )[\w^]+)*)?")
+# The units of x and y, and of theta, of a variable over components.
+BY_COMPONENT = re.compile(r"(\S+) \(x, y\), (\S+) \(theta\)(.*)")
 FACTS = ("shown_unit", "shown_factor")  # attributes of a result in another unit
-
-
-def length_factor(scene: Any, unit: str) -> float:
-    """Return the factor from lengths in the results of a scene to lengths in a unit;
-    Refusal for a unit that the scene's lengths cannot have.
-
-    Examples
-    --------
-    >>> import geomech
-    >>> from geomech.results.lengths import length_factor
-    >>> length_factor(geomech.load("shovel-nosed-snake"), "BL")
-    1.0
-    """
-    choose("``unit``", unit, UNITS)
-    own = own_unit(scene)
-    if unit == own:
-        return 1.0
-    if own == "m" and unit in METRES:
-        return 1.0 / METRES[unit]
-    if own == "m" and hasattr(scene, "system"):
-        return 1.0 / body_size(scene.system)
-    if own == "m":
-        raise Refusal(
-            "a robot has no body length",
-            where="``unit``",
-            value=unit,
-            instead=f"give one of {', '.join(METRES)}",
-        )
-    if own == BODY_LENGTH:
-        raise Refusal(
-            f"lengths of {scene.name} are in body lengths",
-            where="``unit``",
-            value=unit,
-            instead="give its [body] a length in m, such as length = 0.15, or unit BL",
-        )
-    raise Refusal(
-        f"lengths of {scene.name} are in {own}",
-        where="``unit``",
-        value=unit,
-        instead="leave ``unit`` out",
-    )
-
-
-def own_unit(scene: Any) -> str:
-    """Return the unit of lengths in the results of a scene."""
-    if hasattr(scene, "system"):
-        return length_unit(scene.system)
-    return "m"
 
 
 def in_lengths(result: Result, unit: str) -> Result:
     """Return a result whose lengths are in a unit: "m", "cm", "mm" or "BL".
+
+    Its kind has the units of its lengths (`Plain.lengths`).
 
     Examples
     --------
@@ -83,17 +38,25 @@ def in_lengths(result: Result, unit: str) -> Result:
     >>> moved["x"].unit, moved["x"].values.round(2).tolist()
     ('cm', [[-0.77]])
     """
-    scene = scene_of(result)
-    factor = length_factor(scene, unit)
-    own = own_unit(scene)
-    variables = [converted(v, own, unit, factor) for v in result.variables]
+    choose("``unit``", unit, UNITS)
+    lengths = kind_of(result).lengths(result)
+    name = result.attributes.get("scene") or result.attributes.get("file", "the result")
+    factors = {own: lengths.factor(own, unit, name) for own in lengths.metres}
+    variables = []
+    for variable in result.variables:
+        if variable.name not in lengths.kept:
+            for own, factor in factors.items():
+                if own != unit:
+                    variable = converted(variable, own, unit, factor)
+        variables.append(variable)
     facts = dict(result.attributes)
-    for name in LENGTHS:
-        if name in facts:
-            facts[name] = factor * facts[name]
+    own = facts.get("length_unit", next(iter(factors)))
+    for each in LENGTHS:
+        if each in facts and own in factors:
+            facts[each] = factors[own] * facts[each]
     if "length_unit" in facts:
         facts["length_unit"] = unit
-    facts |= {"shown_unit": unit, "shown_factor": factor}
+    facts |= {"shown_unit": unit, "shown_factor": next(iter(factors.values()))}
     return replace(result, variables=tuple(variables), attributes=facts)
 
 
@@ -111,23 +74,59 @@ def converted(variable: Variable, own: str, unit: str, factor: float) -> Variabl
     own: unit of lengths in the variable's unit, such as m in m/s."""
     parts: Unit = variable.unit
     if isinstance(parts, str):
-        shown = unit_with(parts, own, unit)
-        if shown == parts:
+        by_component = BY_COMPONENT.fullmatch(parts)
+        if by_component is not None and "component" in variable.dims:
+            return _converted_components(variable, by_component, own, unit, factor)
+        shown, power = unit_with(parts, own, unit)
+        if not power:
             return variable
-        return variable.with_arrays(lambda x: factor * x, unit=shown)
-    shown_parts = tuple(unit_with(part, own, unit) for part in parts)
-    if shown_parts == parts:
+        return variable.with_arrays(lambda x: factor**power * x, unit=shown)
+    shown_parts, powers = zip(*(unit_with(part, own, unit) for part in parts))
+    if not any(powers):
         return variable
-    changes = np.array([a != b for a, b in zip(shown_parts, parts)])
-    factors = np.where(changes, factor, 1.0)
-    shape = (-1, *[1] * (variable.values.ndim - 1))
-    return variable.with_arrays(lambda x: factors.reshape(shape) * x, unit=shown_parts)
+    return _scaled(variable, 0, factor, powers, shown_parts)
 
 
-def unit_with(text: str, own: str, unit: str) -> str:
-    """Return a unit such as m, m/s or m/rad2 with another unit of length; any other as
-    it is."""
-    match = re.fullmatch(rf"{re.escape(own)}(/(?:s|rad|rad2))?", text)
-    if match is None:
-        return text
-    return unit + (match[1] or "")
+def _converted_components(
+    variable: Variable, units: re.Match, own: str, unit: str, factor: float
+) -> Variable:
+    """Return a variable over components x, y and theta, such as rows of A, with the
+    lengths of x and y in another unit."""
+    position, position_power = unit_with(units[1], own, unit)
+    heading, heading_power = unit_with(units[2], own, unit)
+    powers = (position_power, position_power, heading_power)
+    shown = f"{position} (x, y), {heading} (theta){units[3]}"
+    axis = variable.dims.index("component")
+    return _scaled(variable, axis, factor, powers, shown)
+
+
+def _scaled(
+    variable: Variable, axis: int, factor: float, powers: Sequence[int], unit: Unit
+) -> Variable:
+    """Return a variable times powers of a factor, one for each place of an axis."""
+    shape = [1] * variable.values.ndim
+    shape[axis] = -1
+    factors = (factor ** np.array(powers, float)).reshape(shape)
+    return variable.with_arrays(lambda x: factors * x, unit=unit)
+
+
+def unit_with(text: str, own: str, unit: str) -> tuple[str, int]:
+    """Return a unit such as m, m/s, N/m or N m with another unit of length, and the
+    power of lengths in it; any other as it is, with 0.
+
+    Examples
+    --------
+    >>> from geomech.results.lengths import unit_with
+    >>> unit_with("drag/BL", "BL", "cm"), unit_with("m/rad2", "m", "mm")
+    (('drag/cm', -1), ('mm/rad2', 1))
+    """
+    if not PLAIN.fullmatch(text):
+        return text, 0
+    numerator, slash, denominator = text.partition("/")
+    above = re.split(r"( x | )", numerator)
+    below = re.split(r"( x | )", denominator)
+    power = above.count(own) - below.count(own)
+    if not power:
+        return text, 0
+    shown = ["".join(unit if x == own else x for x in part) for part in (above, below)]
+    return slash.join(shown) if slash else shown[0], power

@@ -20,6 +20,7 @@ from geomech.scenes.format import hints, reader
 from geomech.scenes.medium import MEDIUM
 from geomech.scenes.model import Scene, checked_scene
 from rft.core.refusal import Refusal, formatted
+from rft.terradynamics.plates import VERTICAL
 
 if TYPE_CHECKING:
     from geomech.scenes.terradynamics.intruding import Intruding
@@ -109,7 +110,7 @@ def load(scene: str | Path) -> Scene | Any:
     refuse_program(path)
     try:
         if path.suffix != ".toml" and not path.exists():
-            choose("scene", str(scene), _all_builtin_names())
+            choose("scene", str(scene), _all_builtin_names(), ".toml")
         text = read_text(path, LARGEST, pipes=True)
         # Files that a scene from a pipe names are relative to the current folder.
         name = PIPE if path.is_fifo() else str(scene)
@@ -156,7 +157,64 @@ def medium_of(name: str | Path) -> Any:
     if isinstance(name, Path) or name.lower().endswith((".toml", *ENDINGS)):
         medium, _ = _medium_file(name, "medium")
         return medium
-    return MEDIA[choose("medium", name, MEDIA)]
+    if name in VERTICAL:
+        raise Refusal(
+            f"{name!r} is a stress map of the vertical plane, for legs and wheels",
+            where="medium",
+            instead=f"for a body that undulates, use one of {', '.join(MEDIA)}",
+        )
+    builtin = builtin_text(name)
+    if builtin is not None:
+        named = tables_of(builtin).get("medium", {}).get("name")
+        instead = f"use one of {', '.join(MEDIA)}"
+        if named in MEDIA:
+            instead = f"use its medium, {named!r}"
+        raise Refusal(f"{name!r} is a scene", where="medium", instead=instead)
+    return MEDIA[choose("medium", name, MEDIA, ".toml")]
+
+
+def medium(name: str | Path) -> Any:
+    """Return a medium of the catalogue by its name, or the medium of a file.
+
+    It is a force law for bodies that undulate, such as `rft.Granular`, or a stress map
+    of the vertical plane for legs and wheels, which `rft.mujoco.attach` takes.
+
+    name: 'geomech scenes' lists the names. A file is TOML with a table [medium], or
+    with the keys of one alone, as ``geomech fit-medium`` writes it, or CSV of plate
+    drags. Refusal for anything else.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> geomech.medium("glass-0.3mm-loose").C
+    1.8
+    >>> geomech.medium("poppy-seeds-loose").zeta
+    1.0
+    """
+    from geomech.scenes.terradynamics.stress import stress_map
+
+    word = str(name)
+    if word in MEDIA:
+        return MEDIA[word]
+    path = Path(word)
+    if word in VERTICAL or path.suffix.lower() in ENDINGS:
+        return stress_map(word)
+    if path.suffix.lower() != ".toml" and not path.exists():
+        choose("medium", word, (*MEDIA, *VERTICAL), ".toml")
+    if _has_law(path):
+        law, _ = _medium_file(word, "medium")
+        return law
+    return stress_map(word)
+
+
+def _has_law(path: Path) -> bool:
+    """Return whether a TOML file has a force law; False for one that is not read."""
+    try:
+        tables = tables_of(read_text(path, LARGEST))
+    except (OSError, ValueError):
+        return False
+    table = tables.get("medium", tables)
+    return isinstance(table, Mapping) and "law" in table
 
 
 def medium_in(text: str) -> Any:

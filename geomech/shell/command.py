@@ -28,6 +28,7 @@ IN_FOLDER = (".json", ".csv", ".nc", ".txt")  # formats that fill a folder
 PICTURES = (".png", ".pdf", ".svg")  # those of --plot
 FOLDER = ""  # in place of an ending
 FIGURE = "Figure, with --plot"  # heading of the options that pictures share
+PRINTED = "unit"  # the shared option that changes what is printed as well
 SUBJECT = "subject"  # name of the first argument in the function of a command
 
 
@@ -91,6 +92,7 @@ def command(question: type[Question]) -> Callable[..., None]:
             as_json=given["as_json"],
             yes=given["yes"],
             everything=given["everything"],
+            unit=given.get("unit"),
         )
 
     signature = inspect.Signature(parameters(declared))
@@ -124,7 +126,8 @@ def parameters(declared: Declaration) -> list[inspect.Parameter]:
         found.append(option_parameter(name, *declaration))
     found += common_parameters(declared.question)
     for name, declaration in without(declared.look, declared.picture).items():
-        found.append(option_parameter(name, *declaration, heading=FIGURE))
+        heading = None if name == PRINTED else FIGURE
+        found.append(option_parameter(name, *declaration, heading=heading))
     return found
 
 
@@ -244,7 +247,7 @@ def request(
         question = kind(subject, **option_values(declared.fields, given, subject))
     look = None
     if look_values:
-        look = looks.checked_look(kind, subject, look_values)
+        look = looks.checked_look(question, look_values)
 
     file_values = {}
     for ending, options in declared.files.items():
@@ -315,6 +318,7 @@ def refuse_unused(
         unused = without(declared.picture, used)
         if not any(is_folder(declared.question, path) for path in paths):
             unused = {**unused, **declared.look}
+            unused.pop(PRINTED, None)
         refuse_given(unused, given, "for a figure", "add --plot FILE")
     used = {}
     for path in paths:

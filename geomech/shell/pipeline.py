@@ -17,6 +17,7 @@ from geomech.core.variables import Result
 from geomech.io.files import atomic_file, atomic_folder, note, refuse_inputs
 from geomech.questions.shared.base import Question, Run, ignore
 from geomech.results import show
+from geomech.results.lengths import in_lengths
 from geomech.runs.backend import prefer_for
 from geomech.runs.cost import Cost, decide
 from geomech.shell import terminal
@@ -44,11 +45,12 @@ def execute(
     as_json: bool = False,
     yes: bool = False,
     everything: bool = False,
+    unit: str | None = None,
 ) -> None:
     """Answer a question as a command does.
 
     yes: whatever it costs. everything: all of the result is printed, not only what its
-    kind shows first."""
+    kind shows first. unit: of lengths in what is printed; JSON keeps the scene's."""
     yes = yes or question.unlimited
     inputs = question.inputs()
     question.check()
@@ -65,7 +67,10 @@ def execute(
             output.write(result, path)
     for line in notes_of(result):
         note(line)
-    print("\n".join(printed(result, as_json, everything)))
+    shown = result
+    if unit is not None and not as_json:
+        shown = in_lengths(result, unit)
+    print("\n".join(printed(shown, as_json, everything)))
     if question.folder and not as_json:
         print("\n".join(contents(output.path for output in outputs if output.folder)))
 

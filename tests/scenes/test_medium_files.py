@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+import geomech
 from geomech import scenes as scene
 from rft import CATALOGUE, Granular, Table
 from rft.core.refusal import Refusal
@@ -188,3 +189,13 @@ def test_a_dense_table_is_the_law_it_came_from():
         errors.append(np.abs(drag).max())
     assert errors[-1] < 1e-5
     assert (np.diff(np.log2(errors)) < -2.8).all()
+
+
+def test_a_medium_is_found_by_its_name_or_its_file(tmp_path):
+    for name, law in geomech.media.CATALOGUE.items():
+        assert geomech.medium(name) == law.medium
+    assert geomech.medium("poppy-seeds-loose").zeta == 1.0
+    file = tmp_path / "sand.toml"
+    fit = geomech.fit_medium("short-rod-drag")
+    fit.save(file)
+    assert geomech.medium(file) == geomech.fitted_medium(fit)

@@ -17,6 +17,7 @@ from geomech.mathematics.tiers import TIERS, Tier
 from geomech.plots.look import current, font_points
 from geomech.plots.style import axes_of, figure, shared_legend, styled
 from geomech.scenes.data.measurements import converted, points_of, units_of
+from geomech.scenes.model import Scene
 from geomech.studies.displacement.variables import QUANTITIES, pose_quantities
 from rft.core.refusal import printable
 
@@ -29,6 +30,7 @@ MEDIUM_COLOUR = "#E69F00"  # of the area of a medium's uncertainty
 MEDIUM_EDGE = "#A66F00"
 ERROR = "estimated error, in the tier's colour"
 MEDIUM = "medium, one standard deviation"
+UNNAMED = Scene.name  # of a scene from parts
 MEASURED = "measured"
 PANELS = {  # quantities by the words of --component
     "x": "x",
@@ -103,7 +105,7 @@ def displacement(
         centre = variable.values[best] + _medium_shift(result, quantity)
         medium_band(ax, places[-1], centre, variable.spread[best])
     if data is not None:
-        _draw_measurements(ax, data)
+        draw_measurements(ax, data["amplitude"], data["value"], data.get("error"))
 
     if not span:
         ends = amplitudes + [-SINGLE_SPAN / 2, SINGLE_SPAN / 2]
@@ -204,12 +206,13 @@ def medium_band(ax: Axes, x: Any, values: Any, error: Any) -> None:
     ax.fill_between(x, low, high, facecolor=face, edgecolor=MEDIUM_EDGE, lw=0.8, **look)
 
 
-def _draw_measurements(ax: Axes, data: Mapping) -> None:
-    """Draw measurements as points with bars of their errors, if they have any."""
+def draw_measurements(ax: Axes, x: Any, value: Any, error: Any = None) -> None:
+    """Draw measurements (N,) over x as points with bars of their errors, if they have
+    any."""
     ax.errorbar(
-        data["amplitude"],
-        data["value"],
-        data.get("error"),
+        x,
+        value,
+        error,
         label=MEASURED,
         zorder=4,
         fmt="D",
@@ -278,7 +281,9 @@ def displacement_figure(
         title = printable(name)
         if "note" in table.attributes:
             title = f"{title} (not in the scene)"
-        if len(tables) > 1 or current().inches is None:  # a page has its caption
+        # A page has its caption, and a scene of parts from Python has no name.
+        is_named = current().inches is None and name != UNNAMED
+        if len(tables) > 1 or is_named:
             row[0].set_title(title, loc="left")
         frequency = table.attributes.get("frequency")
         if frequency and panels[-1] == "net_distance":

@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 SETTING_MARKER = "osD^v<>Ph*X"
 SETTINGS = {  # in words, where an entry of [numerics] is short for them
-    "phases": "phases a cycle",
-    "segments": "midpoints a link for the loads",
-    "nodes": "Gauss points a link for the loads",
-    "pieces": "pieces a body length",
+    "phases": "phases per cycle",
+    "segments": "midpoints per link for the loads",
+    "nodes": "Gauss points per link for the loads",
+    "pieces": "pieces per body length",
     "curves": "curves of the family's table",
-    "grid": "points a joint of the grid",
+    "grid": "points of the grid per joint",
     "harmonics": "highest harmonic kept",
     "directions": "directions of the fit",
     "interpolation": "degree of the splines",
@@ -31,17 +31,17 @@ SETTINGS = {  # in words, where an entry of [numerics] is short for them
 PANELS = {
     "truth": (
         "Error of the answer",
-        "rms distance from a far finer force balance (BL)",
+        "rms distance from a far finer force balance",
     ),
     "limit": (
         "Error of one approximation alone",
-        "rms distance from where the setting leads (BL)",
+        "rms distance from where the setting leads",
     ),
 }
 ROBOT_SETTINGS = {  # labels of axes
     "steps": "steps of a cycle",
     "elements": "elements of an outline",
-    "rounding": "rounding (m/s)",
+    "rounding": "rounding",
 }
 LOWEST_ORDER = 0.3  # below it finer settings are said to gain nothing; assumed
 SMALLEST_ERROR = 1e-17  # drawn in place of 0 on a logarithmic axis
@@ -137,6 +137,7 @@ def work_precision(result: Result, axes: Any = None) -> Any:
     count = result["amplitude"].values.size
     for ax, against in zip(axes, panels):
         title, error = PANELS[against]
+        error = f"{error} ({result['error'].unit})"
         for k, line in enumerate(study_lines(result, against=against)):
             colour = f"C{k}"
             if against == "truth":
@@ -239,7 +240,11 @@ def robot_figure(result: Result) -> Figure:
         theory = error.max() * (line.values / line.values[error.argmax()]) ** power
         label = f"order {line.order_by_theory}"
         ax.loglog(line.values, theory, color="0.6", ls="--", lw=0.8, label=label)
-        ax.set(xlabel=ROBOT_SETTINGS[line.varied], ylabel="error of the speed (m/s)")
+        unit = result["speed"].unit
+        setting = ROBOT_SETTINGS[line.varied]
+        if line.varied == "rounding":
+            setting = f"{setting} (m/s)"
+        ax.set(xlabel=setting, ylabel=f"error of the speed ({unit})")
         ax.set_xticks(line.values, [f"{v:g}" for v in line.values], rotation=45)
         ax.minorticks_off()
         ax.legend(loc="best")

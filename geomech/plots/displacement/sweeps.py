@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from geomech.core.variables import Result
-from geomech.plots.displacement.displacements import medium_band
+from geomech.mathematics.systems.base import body_size, length_unit
+from geomech.plots.displacement.displacements import draw_measurements, medium_band
 from geomech.plots.look import colours
 from geomech.plots.style import MARKED, figure, quantity, styled
+from geomech.scenes.data.measurements import METRES, swept_points
 from geomech.scenes.model import Scene
 from geomech.studies.displacement.cycles import AMPLITUDE
 from geomech.studies.displacement.variables import position_spread
@@ -38,6 +40,8 @@ PARAMETER_UNITS = {
     "extent": "rad",
     "regularisation": "BL/rad",
 }
+
+ESTIMATED = "with estimated error"  # label of a curve
 
 ROBOT_UNITS = {  # likewise, in scenes of robots
     "mass": "kg",
@@ -70,9 +74,12 @@ ROBOT_UNITS = {  # likewise, in scenes of robots
 
 
 @styled
-def sweep_figure(scene: Any, result: Result) -> Figure:
+def sweep_figure(scene: Any, result: Result, data: Any = None) -> Figure:
     """Draw a sweep over one parameter or two: net distance or speed, or the speed of a
     robot; refuse more parameters.
+
+    data: measurements to draw as points over a single parameter: the name of a file, or
+    a table, with a column of the parameter, "value" and, if known, "error".
 
     Examples
     --------
@@ -86,9 +93,45 @@ def sweep_figure(scene: Any, result: Result) -> Figure:
             f"cannot draw {count} parameters",
             instead="sweep one or two, or leave ``plot`` out",
         )
+    if data is not None and count > 1:
+        raise Refusal(
+            "measured points are drawn over one parameter",
+            instead="sweep one parameter, or leave ``data`` out",
+        )
     if "status" in result:
-        return _speed_figure(scene, result)
-    return _net_figure(scene, result)
+        return _speed_figure(scene, result, data)
+    return _net_figure(scene, result, data)
+
+
+def measured_units(scene: Any, quantity: str, unit: str) -> dict[str, dict[str, float]]:
+    """Return what is drawn of a sweep, with the units that measurements of it may have.
+
+    quantity: net_distance or speed. unit: of its lengths in the picture."""
+    sizes = {"": 1.0}
+    own = "m"
+    if hasattr(scene, "system"):
+        own = length_unit(scene.system)
+    if unit in METRES:
+        sizes |= {name: size / METRES[unit] for name, size in METRES.items()}
+    if hasattr(scene, "system") and own == "m":
+        body = body_size(scene.system)
+        sizes["BL"] = body / METRES.get(unit, body)
+        if unit == "BL":
+            sizes |= {name: size / body for name, size in METRES.items()}
+    elif own == unit:
+        sizes[own] = 1.0
+    if quantity == "speed":
+        sizes = {f"{name}/s" if name else "": size for name, size in sizes.items()}
+    return {quantity: sizes}
+
+
+def _draw_points(
+    ax: Axes, data: Any, parameter: str, units: dict[str, dict[str, float]]
+) -> None:
+    """Draw measurements over a parameter, with a legend."""
+    points = swept_points(data, parameter, units)
+    draw_measurements(ax, points["parameter"], points["value"], points.get("error"))
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
 
 
 def parameters(result: Result) -> dict[str, np.ndarray]:
@@ -99,8 +142,8 @@ def parameters(result: Result) -> dict[str, np.ndarray]:
 # Swimmers
 
 
-def _net_figure(scene: Scene, result: Result) -> Figure:
-    """Draw `net_values` against one parameter, or a map over two."""
+def _net_figure(scene: Scene, result: Result, data: Any) -> Figure:
+    """Draw `net_values` against one parameter, with measurements, or a map over two."""
     over = parameters(result)
     values, error, spread, label = net_values(result)
     fig, axes = figure(4.0, 3.0)
@@ -113,6 +156,11 @@ def _net_figure(scene: Scene, result: Result) -> Figure:
         if spread is not None:
             spread = spread[order]
         _draw_line(ax, *rising, values[order], error[order], spread)
+        if data is not None:
+            quantity = "speed" if label.startswith("speed") else "net_distance"
+            unit = result["net_distance"].unit
+            units = measured_units(scene, quantity, unit)
+            _draw_points(ax, data, *over, units)
         ax.set_ylabel(label)
     else:
         _draw_map(ax, *rising, values[order], label)
@@ -159,7 +207,7 @@ def _draw_line(
         color="black",
         ms=3,
         lw=1,
-        label="with estimated error",
+        label=ESTIMATED,
     )
     if spread is not None:
         medium_band(ax, x, values, spread)
@@ -215,19 +263,23 @@ def axis_labels(
 
 
 @styled
-def _speed_figure(scene: Any, result: Result) -> Figure:
-    """Draw speed against the first parameter, with a curve for each value of a
-    second."""
+def _speed_figure(scene: Any, result: Result, data: Any) -> Figure:
+    """Draw speed against the first parameter, with measurements, or with a curve for
+    each value of a second."""
     over = parameters(result)
     labels = axis_labels(scene, list(over), ROBOT_UNITS)
     values = list(over.values())
-    names = [""]
+    names = ["" if data is None else ESTIMATED]
     if len(over) == 2:
         names = [f"{labels[1]}: {value:g}" for value in values[1]]
     fig, axes = figure(4.6, 3.2)
     ax = axes[0, 0]
     curves(ax, values[0], result, names)
-    ax.set(xlabel=labels[0], ylabel=f"mean speed ({result['speed'].unit})")
+    unit = result["speed"].unit
+    ax.set(xlabel=labels[0], ylabel=f"mean speed ({unit})")
+    if data is not None:
+        units = measured_units(scene, "speed", unit.removesuffix("/s"))
+        _draw_points(ax, data, *over, units)
     return fig
 
 

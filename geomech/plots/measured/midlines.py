@@ -3,10 +3,12 @@ measured cycles compared with predicted ones."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from geomech.core.errors import choose
 from geomech.core.variables import Result
 from geomech.plots.style import figure, styled
 
@@ -17,29 +19,47 @@ if TYPE_CHECKING:
 MEASURED_COLOUR = "#0072B2"
 PREDICTED_COLOUR = "#D55E00"
 MIDLINES = 12  # of a cycle that are drawn
-COMPARED = ("speed", "heading", "slip")
+ALONG = "_along"
+PANELS = ("track", "slip_along", "amplitude_along", "speed", "heading", "slip")
+COLUMNS = 3
 
 
 @styled
-def midlines_figure(result: Result) -> Figure:
+def midlines_figure(result: Result, panels: Sequence[str] = ()) -> Figure:
     """Draw a result of `fit_gait` of midlines: the track of the body with the midlines
     of one cycle, and slip and amplitude along the body with intervals.
 
     If there is a prediction, the panels below show speed, heading and slip of each
-    cycle, measured and predicted, with their means and intervals."""
+    cycle, measured and predicted, with their means and intervals.
+
+    panels: of PANELS, in this order; by default all. Those of cycles show measured ones
+    alone where there is no prediction."""
     has_prediction = "compared" in result
-    if has_prediction:
-        fig, axes = figure(9.6, 6.0, 3, 2)
-    else:
-        fig, axes = figure(9.6, 3.4, 3)
-    _draw_track(result, axes[0, 0])
-    _draw_along_body(result, "slip", "rad", axes[0, 1])
-    _draw_along_body(result, "amplitude", "BL", axes[0, 2])
-    if has_prediction:
-        for name, ax in zip(COMPARED, axes[1]):
+    names = [choose("panel", name, PANELS) for name in panels]
+    if not names:
+        names = [*PANELS] if has_prediction else [*PANELS[:COLUMNS]]
+    columns = min(COLUMNS, len(names))
+    rows = -(-len(names) // columns)
+    height = 3.4 if rows == 1 else 3.0 * rows
+    fig, axes = figure(3.2 * columns, height, columns, rows)
+    first_of_cycles = True
+    for name, ax in zip(names, axes.ravel()):
+        if name == "track":
+            _draw_track(result, ax)
+        elif name.endswith(ALONG):
+            _draw_along_body(result, name.removesuffix(ALONG), ax)
+        else:
             _draw_cycles(result, name, "", MEASURED_COLOUR, "measured", ax)
-            _draw_cycles(result, name, "_predicted", PREDICTED_COLOUR, "predicted", ax)
-        axes[1, 0].legend(loc="lower center", bbox_to_anchor=(0.62, 1.0), ncols=2)
+            if has_prediction:
+                _draw_cycles(
+                    result, name, "_predicted", PREDICTED_COLOUR, "predicted", ax
+                )
+                if first_of_cycles:
+                    place = {"loc": "lower center", "bbox_to_anchor": (0.62, 1.0)}
+                    ax.legend(ncols=2, **place)
+            first_of_cycles = False
+    for ax in axes.ravel()[len(names) :]:
+        ax.set_axis_off()
     return fig
 
 
@@ -73,11 +93,12 @@ def _draw_track(result: Result, ax: Axes) -> None:
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=2)
 
 
-def _draw_along_body(result: Result, name: str, unit: str, ax: Axes) -> None:
+def _draw_along_body(result: Result, name: str, ax: Axes) -> None:
     """Draw a quantity along the body with its interval."""
     s = result["s"].values
-    values = result[f"{name}_along"].values
-    error = result[f"{name}_along"].error
+    along = result[f"{name}_along"]
+    values = along.values
+    error = along.error
     band = {"color": MEASURED_COLOUR, "alpha": 0.25, "lw": 0}
     ax.fill_between(s, values - error, values + error, **band)
     ax.plot(s, values, "o-", color=MEASURED_COLOUR, lw=1.2)
@@ -85,7 +106,7 @@ def _draw_along_body(result: Result, name: str, unit: str, ax: Axes) -> None:
         xlim=(0, 1),
         ylim=(0, None),
         xlabel="place on the body, tail 0 to head 1",
-        ylabel=f"{name} ({unit})",
+        ylabel=f"{name} ({along.unit})",
     )
     ax.set_title(f"{name} along the body", loc="left")
 

@@ -36,7 +36,8 @@ def _draw_track(ax: Axes, result: Result) -> None:
     for k in range(len(x)):
         alpha = 0.3 + 0.7 * k / len(x)  # later cycles are darker
         ax.plot(x[k], y[k], color="black", lw=1.2, alpha=alpha)
-    ax.set(xlabel="$x$ (BL)", ylabel="$y$ (BL)", aspect="equal")
+    unit = result["body_x"].unit
+    ax.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", aspect="equal")
 
 
 def _draw_distances(ax: Axes, result: Result) -> None:
@@ -51,5 +52,6 @@ def _draw_distances(ax: Axes, result: Result) -> None:
     ax.set_yticks(rows, names)
     ax.invert_yaxis()
     largest = (distance.values + error).max()
-    ax.set(xlabel="distance per cycle (BL)", xlim=(0, 1.15 * largest or None))
+    label = f"distance per cycle ({distance.unit})"
+    ax.set(xlabel=label, xlim=(0, 1.15 * largest or None))
     ax.locator_params(axis="x", nbins=5)

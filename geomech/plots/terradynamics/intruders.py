@@ -10,6 +10,7 @@ import numpy as np
 from geomech.plots.look import colours, font_points
 from geomech.plots.maps import draw_colours, largest
 from geomech.plots.style import figure, styled
+from geomech.results.lengths import shown_lengths
 from geomech.scenes.terradynamics.solid import MeshIntrusion
 
 if TYPE_CHECKING:
@@ -121,37 +122,45 @@ def intrusion_figure(scene: Any, result: Any) -> Any:
     """
     fig, axes = figure(10.2, 3.2, 3)
     columns = {name: v.values for name, v in result.items() if v.dims == ("t",)}
+    unit, factor = shown_lengths(result)
     if hasattr(scene, "mesh"):
         place = axes[0, 0].get_subplotspec()
         axes[0, 0].remove()
         ax = fig.add_subplot(place, projection="3d")
-        _draw_largest_force(ax, scene, columns)
+        _draw_largest_force(ax, scene, columns, unit, factor)
         forces = ["force_x", "force_y", "force_z"]
         moments = ["moment_x", "moment_y", "moment_z"]
     else:
         _, pose, _ = scene.motion.trajectory(scene.outline)
-        _draw_poses(axes[0, 0], scene.outline.points, pose)
+        pose = pose * [factor, factor, 1.0]
+        _draw_poses(axes[0, 0], factor * scene.outline.points, pose, unit)
         forces = ["force_x", "force_z"]
         moments = ["moment"]
 
-    variable, label, scale = _abscissa(columns)
+    variable, label, scale = _abscissa(columns, unit)
     x = scale * columns[variable]
     force_ax = axes[0, 1]
     moment_ax = axes[0, 2]
     _draw_columns(force_ax, x, columns, forces, "F")
     _draw_columns(moment_ax, x, columns, moments, "M")
     force_ax.set(xlabel=label, ylabel="force (N)")
-    moment_ax.set(xlabel=label, ylabel="moment about the origin (N m)")
+    moment_unit = result[moments[0]].unit
+    moment_ax.set(xlabel=label, ylabel=f"moment about the origin ({moment_unit})")
     return fig
 
 
-def _draw_largest_force(ax: Any, scene: Any, columns: dict[str, np.ndarray]) -> None:
-    """Draw the mesh of an intruder where the force is largest, on 3-D axes."""
+def _draw_largest_force(
+    ax: Any, scene: Any, columns: dict[str, np.ndarray], unit: str, factor: float
+) -> None:
+    """Draw the mesh of an intruder where the force is largest, on 3-D axes.
+
+    unit: of the arrows beside it. factor: of lengths in m to it."""
     force = np.stack([columns[f"force_{axis}"] for axis in "xyz"], -1)
     step = int(np.linalg.norm(force, axis=-1).argmax())
     trajectory = scene.motion.trajectory(scene.mesh)
     run = MeshIntrusion(trajectory, force, columns["moment"], columns["power"])
-    draw_stress(ax, *scene.faces(run, step))
+    scale = ("mm", 1e3) if unit == "m" else (unit, factor)
+    draw_stress(ax, *scene.faces(run, step), scale=scale)
     t = columns["t"][step]
     ax.set_title(f"where the force is largest, t = {t:.3g} s", fontsize=font_points(8))
 
@@ -176,11 +185,18 @@ def _draw_columns(
     ax.margins(x=0.02)
 
 
-def draw_stress(ax: Any, faces: Any, above: np.ndarray, unit: float = 1e3) -> None:
+def draw_stress(
+    ax: Any,
+    faces: Any,
+    above: np.ndarray,
+    unit: float = 1e3,
+    scale: tuple[str, float] = ("mm", 1e3),
+) -> None:
     """Draw a mesh on 3-D axes, coloured by the size of the stress on its faces.
 
     faces: those below the surface (`rft.terradynamics.meshes.Faces`). above: triangles
-    above it (Q, 3, 3), which are grey. unit: of the colours, Pa."""
+    above it (Q, 3, 3), which are grey. unit: of the colours, Pa. scale: unit of the
+    length that arrows show, and how many of it a metre has."""
     from cmcrameri import cm
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -206,16 +222,19 @@ def draw_stress(ax: Any, faces: Any, above: np.ndarray, unit: float = 1e3) -> No
         ax.view_init(elev=elevation, azim=azimuth)
     low = corners.min((0, 1))
     high = corners.max((0, 1))
-    _draw_scale(ax, low, high - low)
+    _draw_scale(ax, low, high - low, *scale)
     bar = ax.figure.colorbar(shades, ax=ax, shrink=0.7, pad=0.02)
     bar.set_label("stress below the surface (kPa)")
 
 
-def _draw_scale(ax: Any, low: np.ndarray, span: np.ndarray) -> None:
+def _draw_scale(
+    ax: Any, low: np.ndarray, span: np.ndarray, unit: str, factor: float
+) -> None:
     """Set the limits of 3-D axes to a body, and draw arrows of a round length in place
     of ticks.
 
-    low: the body's lowest coordinates (3,), m. span: its size along each axis, m."""
+    low: the body's lowest coordinates (3,), m. span: its size along each axis, m. unit,
+    factor: as of `draw_stress`."""
     longest = 0.3 * span.max()
     length = max(k for k in ROUND_LENGTHS if k <= longest)
     corner = low - 0.1 * length
@@ -236,13 +255,13 @@ def _draw_scale(ax: Any, low: np.ndarray, span: np.ndarray) -> None:
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     ax.set_box_aspect(high - low, zoom=0.95)
     ax.set_axis_off()
-    text = f"axes: {1e3 * length:g} mm"
+    text = f"axes: {factor * length:g} {unit}"
     ax.text2D(0.0, 0.02, text, transform=ax.transAxes, fontsize=font_points(8), **grey)
 
 
-def _draw_poses(ax: Axes, points: np.ndarray, pose: np.ndarray) -> None:
+def _draw_poses(ax: Axes, points: np.ndarray, pose: np.ndarray, unit: str) -> None:
     """Draw an outline (N, 2) at some of its poses (T, 3), the track of its origin and
-    the surface."""
+    the surface, all in a unit."""
     rows = np.linspace(0, len(pose) - 1, POSES).round().astype(int)
     for shade, k in zip(np.linspace(0.75, 0.0, POSES), rows):
         x, z, angle = pose[k]
@@ -254,16 +273,17 @@ def _draw_poses(ax: Axes, points: np.ndarray, pose: np.ndarray) -> None:
     marker = "o" if is_still else ""
     ax.plot(pose[:, 0], pose[:, 1], color="C0", lw=0.8, ls=":", marker=marker)
     ax.axhline(0.0, color="peru", lw=1.0, zorder=0)
-    ax.set(xlabel="x (m)", ylabel="z (m)", aspect="equal")
+    ax.set(xlabel=f"x ({unit})", ylabel=f"z ({unit})", aspect="equal")
     ax.set_title(
         "light to dark: poses in time; brown: surface", fontsize=font_points(8)
     )
     ax.margins(0.08)
 
 
-def _abscissa(columns: dict[str, np.ndarray]) -> tuple[str, str, float]:
+def _abscissa(columns: dict[str, np.ndarray], unit: str) -> tuple[str, str, float]:
     """Return (column, label, factor of its values) of the quantity that a motion is
-    drawn against: an angle, depth or x where it goes one way, else time."""
+    drawn against: an angle, depth or x where it goes one way, else time. unit: of
+    lengths."""
     time = ("t", "t (s)", 1.0)
     if "angle" in columns:
         return "angle", "angle (degrees)", 180 / np.pi
@@ -272,10 +292,10 @@ def _abscissa(columns: dict[str, np.ndarray]) -> tuple[str, str, float]:
     if np.ptp(columns.get("y", 0.0)) > max(x_range, z_range):
         return time
     if z_range > x_range and not _reverses(columns["z"]):
-        return "z", "height of the origin, z (m)", 1.0
+        return "z", f"height of the origin, z ({unit})", 1.0
     if _reverses(columns["x"]):
         return time
-    return "x", "x (m)", 1.0
+    return "x", f"x ({unit})", 1.0
 
 
 def _reverses(values: np.ndarray) -> bool:

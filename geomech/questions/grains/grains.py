@@ -45,6 +45,7 @@ class Grains(Question):
     store: Store = field(default=None, compare=False)
 
     name: ClassVar[str] = "grains"
+    looks: ClassVar[tuple[str, ...]] = (*Question.looks, "unit")
     table: ClassVar[tuple[str, ...]] = ("t",)
     cheaper_alternative: ClassVar[str] = "use fewer ``cycles``"
     consent_beyond: ClassVar[str] = "ten minutes"
@@ -70,6 +71,12 @@ class Grains(Question):
     def check(self) -> None:
         self.study.check()
 
+    def check_unit(self, unit: str) -> None:
+        from geomech.core.errors import choose
+        from geomech.results.length_units import UNITS
+
+        choose("``unit``", unit, UNITS)  # a body in grains has a length
+
     def cost(self) -> Cost:
         return self.study.cost()
 
@@ -79,13 +86,23 @@ class Grains(Question):
     @staticmethod
     def headline(result: Result) -> list[str]:
         facts = result.attributes
-        length = 1e3 * float(result["body_length"])
-        width = 2e3 * float(result["body_radius"])
+        length = float(result["body_length"])
+        width = 2 * float(result["body_radius"])
+        unit = result["body_length"].unit
+        if unit == "m":
+            length, width, unit = 1e3 * length, 1e3 * width, "mm"
         frequency = float(result["frequency"])
         return [
             f"{facts['scene']} in {facts['grains']:,} grains, seed {facts['seed']}: "
-            f"body {length:g} mm long, {width:g} mm wide, {frequency:g} Hz"
+            f"body {length:g} {unit} long, {width:g} {unit} wide, {frequency:g} Hz"
         ]
+
+    @staticmethod
+    def lengths(result: Result) -> Any:
+        from geomech.results.length_units import Lengths
+
+        body = float(result["body_length"])
+        return Lengths({"BL": body, "m": 1.0}, body)
 
     @staticmethod
     def summary(result: Result) -> Result:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 HELP = "table of joint angles, x, y, heading, or of midline points"
 SCENE = ".toml"
+PANELS = "panels of midlines: track,slip_along,amplitude_along,speed,heading,slip"
 
 
 def write_scene(path: Path, result: Result, *, field: Path | None = None) -> None:
@@ -40,6 +41,13 @@ def write_scene(path: Path, result: Result, *, field: Path | None = None) -> Non
             instead=f"write that file first, for example with save({str(field)!r})",
         )
     write_text(path, scene_text(result, field, path))
+
+
+NO_SIZE = {  # cures where a measurement has no absolute size, by its form
+    "log": "name the columns x_m and y_m and give ``body_length``, or give unit BL",
+    "midlines": "give the mm per pixel as ``scale`` or the unit as ``units``, or unit "
+    "BL",
+}
 
 
 @dataclass(frozen=True)
@@ -114,6 +122,7 @@ class FitGait(Question):
     connection_file: Path | None = field(default=None, kw_only=True)
 
     name: ClassVar[str] = "fit_gait"
+    looks: ClassVar[tuple[str, ...]] = (*Question.looks, "unit")
     table: ClassVar[tuple[str, ...]] = ("cycle",)
 
     def __post_init__(self) -> None:
@@ -141,7 +150,7 @@ class FitGait(Question):
         if scenes and len(fields) != 1:
             raise Refusal(
                 f"{scenes[0]} reads the connection from one file",
-                instead="say -o FIELD.nc, too",
+                instead="add -o FIELD.nc",
             )
         connection_file = None
         if scenes:
@@ -179,27 +188,58 @@ class FitGait(Question):
             return self._of_log()
         return self._of_midlines()
 
+    @cached_property
+    def measurements(self) -> Any:
+        """The log or the trial of the file; values from Python as they are."""
+        if self.path is None:
+            return self.file
+        if self.form == "log":
+            from geomech.studies.measured.log import read as read_log
+
+            return read_log(self.path, self.columns, self.degrees)
+        from geomech.studies.measured.midlines.reader import read
+
+        names = (
+            "units", "scale", "fps", "y", "least_score", "body_length", "individual",
+        )  # fmt: skip
+        given = {name: getattr(self, name) for name in names}
+        return read(self.path, points=self.columns, **given)
+
+    def check_unit(self, unit: str) -> None:
+        from geomech.core.errors import choose
+        from geomech.results.length_units import UNITS
+
+        choose("``unit``", unit, UNITS)
+        found = self.measurements
+        in_metres = getattr(found, "unit", "") == "m"
+        if self.form == "log":
+            has_length = self.body_length is not None
+            in_metres = has_length and getattr(found, "metres", False)
+        if in_metres or unit == "BL":
+            return
+        raise Refusal(
+            f"lengths of {found.name} are in body lengths only",
+            where="``unit``",
+            value=unit,
+            instead=NO_SIZE[self.form],
+        )
+
     def _of_log(self) -> Result:
         from geomech.studies.measured.fit import fit_log
         from geomech.studies.measured.results import fit_result
 
         names = ("columns", "degrees", "level", "harmonics", "limits", "body_length")
-        log: Any = self.file
         given = {name: getattr(self, name) for name in names}
-        return fit_result(fit_log(log, **given), self.mapped)
+        return fit_result(fit_log(self.measurements, **given), self.mapped)
 
     def _of_midlines(self) -> Result:
         from geomech.studies.measured.midlines.fit import fit_midlines
         from geomech.studies.measured.midlines.predicted import compare
         from geomech.studies.measured.midlines.results import trial_result
 
-        names = (
-            "columns", "units", "scale", "fps", "y", "head", "least_score",
-            "individual", "body_length", "mend", "level",
-        )  # fmt: skip
-        midlines: Any = self.file
-        given = {name: getattr(self, name) for name in names}
-        fit = fit_midlines(midlines, **given)
+        fit = fit_midlines(
+            self.measurements, head=self.head, mend=self.mend, level=self.level
+        )
         if self.loaded_medium is None:
             return trial_result(fit)
         return trial_result(fit, compare(fit, self.loaded_medium, tuple(self.effects)))
@@ -230,14 +270,42 @@ class FitGait(Question):
         return presenting(result).remarks(result)
 
     @staticmethod
-    def draw(result: Result) -> Any:
+    def lengths(result: Result) -> Any:
+        from geomech.results.length_units import Lengths
+
+        if result.attributes["form"] == "log":
+            if result.attributes["length_unit"] != "m":
+                return Lengths({"BL": None})
+            return Lengths({"m": 1.0}, float(result.attributes["body_length"]))
+        body = result["body_length"]
+        if body.unit != "m":
+            return Lengths({"BL": None})
+        return Lengths({"BL": float(body), "m": 1.0}, float(body))
+
+    def check_draw(self, component: Sequence[str] = ()) -> None:
+        if component and self.form == "log":
+            raise Refusal(
+                "``component`` chooses panels of midlines",
+                instead="leave it out for a log of joint angles",
+            )
+
+    @staticmethod
+    def draw(
+        result: Result,
+        *,
+        component: Annotated[
+            Sequence[str], Option(PANELS, "NAMES", parsing.midline_panels)
+        ] = (),
+    ) -> Any:
         """Draw the mean gait, the connection along it and its cycles; or the way of the
         body, slip and amplitude along it, and the prediction. Return the Figure."""
         from geomech import plots
 
         if result.attributes["form"] == "log":
             return plots.measured_figure(result)
-        return plots.midlines_figure(result)
+        if isinstance(component, str):
+            component = (component,)
+        return plots.midlines_figure(result, component)
 
 
 def presenting(result: Result) -> ModuleType:

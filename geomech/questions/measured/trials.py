@@ -14,17 +14,20 @@ SHOWN = (
 
 def headline(result: Result) -> list[str]:
     facts = result.attributes
-    noise = float(result["noise"])
+    noise = result["noise"]
     cycles = f"{facts['cycles']} full cycles of {facts['points']} points"
     first = f"{facts['file']}: {cycles}"
-    if facts["cycles_left_out"]:
-        first = f"{first}; {facts['cycles_left_out']} cycles with gaps left out"
+    left_out = facts["cycles_left_out"]
+    if left_out == 1:
+        first = f"{first}; 1 cycle with gaps left out"
+    elif left_out:
+        first = f"{first}; {left_out} cycles with gaps left out"
     return [
         first,
         f"head: {facts['head']}",
         f"smoothed by {facts['modes']} modes along the body and "
         f"{facts['knots_per_cycle']:.3g} knots per cycle, more than cross-validation "
-        f"chose; noise of a point {noise:.2g} BL",
+        f"chose; noise of a point {float(noise):.2g} {noise.unit}",
         f"with {100 * facts['level']:.3g} % confidence intervals:",
     ]
 

@@ -176,6 +176,12 @@ class Question(Plain):
         """Refuse options of `draw` that make no sense together, before anything is
         computed."""
 
+    def check_unit(self, unit: str) -> None:
+        """Refuse a unit of length that the answer's lengths cannot have."""
+        from geomech.results.length_units import length_factor
+
+        length_factor(self.subject, unit)
+
     def cost(self) -> "Cost | None":
         """Return the cost of the answer; None where it takes almost no time."""
         return None

@@ -24,7 +24,9 @@ class FigureOptions:
     width: Annotated[
         Any, Option("width on the page, such as 3.4in, 86mm or 246pt", "WIDTH")
     ] = None
-    unit: Annotated[Any, Option("unit of lengths: m, cm, mm or BL", "UNIT")] = None
+    unit: Annotated[
+        Any, Option("unit of lengths, in print as well: m, cm, mm or BL", "UNIT")
+    ] = None
     font: Annotated[
         Any, Option("font and size in points, as Arial,8 or 8", "NAME,SIZE")
     ] = None
@@ -124,7 +126,7 @@ def refuse_option(question: Any, name: str, known: Iterable[str]) -> None:
     )
 
 
-def checked_look(question: Any, subject: Any, values: dict[str, Any]) -> Any:
+def checked_look(question: Any, values: dict[str, Any]) -> Any:
     """Return the look with these values; Refusal, before anything is computed, for one
     that makes no sense."""
     from geomech.plots.look import Look
@@ -132,7 +134,5 @@ def checked_look(question: Any, subject: Any, values: dict[str, Any]) -> Any:
     look = Look(**values)
     look.check()
     if look.unit is not None:
-        from geomech.results.lengths import length_factor
-
-        length_factor(subject, look.unit)
+        question.check_unit(look.unit)
     return look

@@ -13,6 +13,8 @@ from rft.core.refusal import Refusal
 
 FORCE_PANELS = ("forward", "normal", "tangential", "power", "moment", "phase", "place")
 
+MIDLINE_PANELS = ("track", "slip_along", "amplitude_along", "speed", "heading", "slip")
+
 
 def amplitudes(text: str, scene: Any, flag: str) -> tuple[float, ...]:
     """Return the amplitudes in 0.5,1,30deg or START:STOP:COUNT."""
@@ -66,6 +68,11 @@ def curve_panels(text: str, scene: Any, flag: str) -> tuple[str, ...]:
 def force_panels(text: str, scene: Any, flag: str) -> tuple[str, ...]:
     """Return the panels in forward,power."""
     return texts.components(text, FORCE_PANELS)
+
+
+def midline_panels(text: str, scene: Any, flag: str) -> tuple[str, ...]:
+    """Return the panels in track,speed."""
+    return texts.components(text, MIDLINE_PANELS)
 
 
 def colour_limit(text: str, scene: Any, flag: str) -> float | str | None:

@@ -45,6 +45,7 @@ class Accuracy(Question):
     ] = None
 
     name: ClassVar[str] = "accuracy"
+    looks: ClassVar[tuple[str, ...]] = (*Question.looks, "unit")
     table: ClassVar[tuple[str, ...]] = ("setting", "fineness")
     parallel: ClassVar[bool] = True
 
@@ -72,7 +73,8 @@ class Accuracy(Question):
         facts = result.attributes
         words = f"{facts['scene']}: error of {facts['about']}"
         if "speed" in result:
-            words = f"{words}, {result['speed'].values:.6g} m/s,"
+            speed = result["speed"]
+            words = f"{words}, {float(speed):.6g} {speed.unit},"
         return [f"{words} against computing time in seconds"]
 
     @staticmethod
@@ -86,13 +88,25 @@ class Accuracy(Question):
             system_error = size(float(result["own_error"]))
             lines.append(
                 "errors in the table include the error of the system itself, "
-                f"{system_error} BL, which no setting reduces; those below do not"
+                f"{system_error} {result['own_error'].unit}, which no setting "
+                "reduces; those below do not"
             )
         for k in range(result.sizes["setting"]):
             for name in ERRORS:
                 if name in result:
                     lines.append(setting_words(result, k, name))
         return lines
+
+    @staticmethod
+    def lengths(result: Result) -> Any:
+        """Errors of a gait are in body lengths, whatever the unit of its scene."""
+        from geomech.results.length_units import Lengths, scene_lengths
+        from geomech.results.scenes import scene_of
+
+        lengths = scene_lengths(scene_of(result))
+        if hasattr(scene_of(result), "system"):
+            return Lengths({"BL": lengths.body}, lengths.body)
+        return lengths
 
     @staticmethod
     def draw(result: Result) -> Any:

@@ -12,12 +12,15 @@ from geomech.questions.shared.base import Option, Question, Run, Subject
 from geomech.questions.shared.common import ColourLimit
 from geomech.results.show import scalar
 from geomech.runs.cost import Cost
+from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
     from geomech.scenes.model import Scene
     from geomech.studies.mechanics.newtons import Sizes
 
 PANELS = f"panels among {','.join(parsing.FORCE_PANELS)}"
+# Variables that are places on the body, tail 0 to head 1, whatever its length.
+SHARES = ("s", "point", "joint", "place", "length", "largest_moment_s")
 EQUAL = 1e-6  # relative difference up to which powers are called the same
 
 
@@ -40,7 +43,7 @@ class Forces(Question):
     frequency: Annotated[float | None, Option("cycles per second", "HZ")] = None
 
     name: ClassVar[str] = "forces"
-    looks: ClassVar[tuple[str, ...]] = (*Question.looks, "cmap")
+    looks: ClassVar[tuple[str, ...]] = (*Question.looks, "unit", "cmap")
     table: ClassVar[tuple[str, ...]] = ("phase", "s")
 
     @property
@@ -58,6 +61,20 @@ class Forces(Question):
 
         forces.check(self.scene, self.sizes)
 
+    def check_unit(self, unit: str) -> None:
+        from geomech.core.errors import choose
+        from geomech.results.length_units import UNITS
+        from geomech.studies.mechanics import forces
+
+        choose("``unit``", unit, UNITS)
+        if unit != "BL" and forces.body_length(self.scene, self.sizes) is None:
+            raise Refusal(
+                f"lengths of {self.scene.name} are in body lengths",
+                where="``unit``",
+                value=unit,
+                instead="give the ``length`` of the body in m, or unit BL",
+            )
+
     def cost(self) -> Cost:
         from geomech.studies.mechanics import forces
 
@@ -67,6 +84,18 @@ class Forces(Question):
         from geomech.studies.mechanics import forces
 
         return forces.answer(self.scene, self.sizes)
+
+    @staticmethod
+    def lengths(result: Result) -> Any:
+        from geomech.results.length_units import Lengths
+        from geomech.results.scenes import scene_of
+        from geomech.studies.mechanics import forces
+
+        sizes = forces.NO_SIZES
+        if result.question is not None:
+            sizes = result.question.sizes
+        body = forces.body_length(scene_of(result), sizes)
+        return Lengths({"BL": body, "m": 1.0}, body, kept=SHARES)
 
     @staticmethod
     def headline(result: Result) -> list[str]:

@@ -53,12 +53,28 @@ class Sweep(Question):
     def check(self) -> None:
         _ = self.plan.grid  # refuses points that make no scene
 
-    def check_draw(self) -> None:
+    def check_draw(self, data: Any = None) -> None:
         if len(self.over) > LARGEST_DRAWN:
             raise Refusal(
                 f"cannot draw {len(self.over)} parameters",
                 instead="sweep one or two parameters, or leave ``plot`` out",
             )
+        if data is None:
+            return
+        if len(self.over) > 1:
+            raise Refusal(
+                "measured points are drawn over one parameter",
+                instead="sweep one parameter, or leave ``data`` out",
+            )
+        from geomech.plots.displacement.sweeps import measured_units
+        from geomech.results.length_units import own_unit
+        from geomech.scenes.data.measurements import swept_points
+
+        unit = own_unit(self.scene)
+        units = measured_units(self.scene, "net_distance", unit)
+        units |= measured_units(self.scene, "speed", unit)
+        (parameter,) = self.over
+        swept_points(data, parameter, units)  # refuses a file without points
 
     def cost(self) -> Cost:
         return self.plan.cost
@@ -86,9 +102,18 @@ class Sweep(Question):
         return result.only(*SHOWN)
 
     @staticmethod
-    def draw(result: Result) -> Any:
+    def draw(
+        result: Result,
+        *,
+        data: Annotated[
+            Any,
+            Option(
+                "points to draw over a single KEY, such as C,value,error", "FILE.csv"
+            ),
+        ] = None,
+    ) -> Any:
         """Draw curves over one parameter, or maps over two; return the Figure."""
         from geomech import plots
         from geomech.results.scenes import scene_of
 
-        return plots.sweep_figure(scene_of(result), result)
+        return plots.sweep_figure(scene_of(result), result, data)

@@ -26,7 +26,7 @@ class Intrude(Question):
     scene: Annotated["Intruding", Subject(loading.load_intruder, names.intruder_names)]
 
     name: ClassVar[str] = "intrude"
-    looks: ClassVar[tuple[str, ...]] = (*Question.looks, "cmap")
+    looks: ClassVar[tuple[str, ...]] = (*Question.looks, "unit", "cmap")
     table: ClassVar[tuple[str, ...]] = ("t",)
     unlimited: ClassVar[bool] = True  # it takes seconds at most
 
@@ -142,5 +142,6 @@ def error_words(result: Result) -> str:
             f"unknown: a finer computation would exceed the largest number of {parts}"
         )
     count = int(result["finest_parts"].values)
-    sizes = f"force {force:.1g} N, moment {moment:.1g} N m"
+    unit = result["largest_moment_error"].unit
+    sizes = f"force {force:.1g} N, moment {moment:.1g} {unit}"
     return f"{sizes} at most, estimated with up to {count:,} {parts}"

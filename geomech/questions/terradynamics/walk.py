@@ -103,10 +103,11 @@ class Walk(Question):
         steps = float(result["speed_error_of_steps"])
         elements = float(result["speed_error_of_elements"])
         share = 100 * float(result["unaccounted"])
+        unit = result["speed"].unit
         lines = [
             motion_words(result),
-            f"of the error, {steps:.1g} m/s come from the steps and {elements:.1g} "
-            "m/s from the elements",
+            f"of the error, {steps:.1g} {unit} come from the steps and {elements:.1g} "
+            f"{unit} from the elements",
             (
                 f"energy balance of the steps: {share:.2g} % of the work is "
                 "unaccounted for"
@@ -118,8 +119,8 @@ class Walk(Question):
             speed_error = float(result["speed_error_of_unsolved"])
             lines.append(
                 f"{unsolved} steps did not converge, with residuals up to "
-                f"{residual:.1g} m/s, which change the speed by {speed_error:.1g} "
-                "m/s: raise [numerics] steps or rounding"
+                f"{residual:.1g} {result['residual'].unit}, which change the speed by "
+                f"{speed_error:.1g} {unit}: raise [numerics] steps or rounding"
             )
         return lines
 
@@ -156,10 +157,11 @@ def settling_words(result: Result) -> str:
 def motion_words(result: Result) -> str:
     """Return where the robot went and how far it turned."""
     t, x, z = (result[name].values for name in ("t", "x", "z"))
-    words = f"t = 0 to {t[-1]:.4g} s: x to {x[-1]:.4g} m"
+    unit = result["x"].unit
+    words = f"t = 0 to {t[-1]:.4g} s: x to {x[-1]:.4g} {unit}"
     if "y" in result:
-        words = f"{words}, y to {result['y'].values[-1]:.2g} m"
-    words = f"{words}, z {z.min():.4g} to {z.max():.4g} m"
+        words = f"{words}, y to {result['y'].values[-1]:.2g} {unit}"
+    words = f"{words}, z {z.min():.4g} to {z.max():.4g} {unit}"
     for name, positive in ANGLES.items():
         if name in result:
             degrees = np.degrees(result[name].values)

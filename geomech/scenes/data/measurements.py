@@ -40,8 +40,8 @@ def read(path: str | Path, scene: Scene, angle: bool = False) -> dict[str, np.nd
     The header has the columns amplitude and value, and optionally error, in any order;
     or, in place of value, some of x, y, net_distance (or distance) and heading, each
     with its error, such as x_error. A name may have another unit, as amplitude_deg,
-    value_mm or x_error_BL. angle: values are headings. Refusal, with the line, for any
-    other file."""
+    value_mm or x_error_BL; an error without one has that of its quantity. angle: values
+    are headings. Refusal, with the line, for any other file."""
     source = rows.read(path, LARGEST_FILE, f"give a CSV file with the header {HEADER}")
     length = body_size(scene.system)
     in_angles = "amplitude" in angles_of(type(scene.gait))
@@ -96,6 +96,70 @@ def units_of(
     if angle:
         value = ANGLES
     return {"amplitude": amplitude, "value": value, "error": value, **named, **errors}
+
+
+def swept_points(
+    data: str | Path | Mapping, parameter: str, units: Mapping[str, dict[str, float]]
+) -> dict[str, np.ndarray]:
+    """Return columns (N,) of what was measured at values of a swept parameter:
+    parameter, value and, if there is one, error.
+
+    data: a file or a table with a column of the parameter, named as a whole or by its
+    last part, such as medium.C or C, and one of the quantities. units: the quantities
+    that are drawn, such as net_distance, with the factors of their units; value stands
+    for the first. Refusal, with the place, for anything else."""
+    last = parameter.rpartition(".")[2]
+    source = None
+    place = "data"
+    words = [str(word) for word in data] if isinstance(data, Mapping) else []
+    if isinstance(data, str | Path):
+        header = f"give a CSV file with the header {last},value,error"
+        source = rows.read(data, LARGEST_FILE, header)
+        words = [*source.words]
+        place = source.place
+    found: dict[str, tuple[str, float]] = {}
+    for word in words:
+        name, factor = word.strip(), 1.0
+        if name.lower() not in (parameter.lower(), last.lower()):
+            name, factor = _swept_column(word, words, units, place)
+            if not name:
+                continue
+        else:
+            name = "parameter"
+        if name in found:
+            raise Refusal(f"the header names {name} twice", where=place)
+        found[name] = (word, factor)
+    if not {"parameter", "value"} <= {*found}:
+        raise Refusal(
+            f"the header must be {last},value,error",
+            value=",".join(words),
+            where=place,
+            instead=f"or name the quantity, such as {last},{next(iter(units))}",
+        )
+    if source is None:
+        table = {name: unmasked(name, data[word]) for name, (word, _) in found.items()}
+    else:
+        wanted = [word for word, _ in found.values()]
+        table = dict(zip(found, source.numbers(wanted).T))
+        source.issue()
+    return {name: factor * table[name] for name, (_, factor) in found.items()}
+
+
+def _swept_column(
+    word: str, words: Sequence[str], units: Mapping[str, dict[str, float]], place: str
+) -> tuple[str, float]:
+    """Return value or error for a column, with the factor of its unit; "" for one that
+    is not drawn."""
+    name, unit = column_of(word)
+    unit = unit or dict(map(column_of, words)).get(quantity_of_error(name), "")
+    ending = "error" if name.endswith("error") else "value"
+    quantity = name.removesuffix("_error")
+    if name in ("value", "error"):
+        quantity = next(iter(units))
+    if quantity not in units:
+        return "", 1.0
+    with located(place):
+        return ending, _scale(name, unit, units[quantity], "the scene")
 
 
 def points_of(
@@ -159,8 +223,10 @@ def _scales(
     results, by column; Refusal for other columns. owner: of the results, for a
     Refusal."""
     scales: dict[str, float] = {}
+    named = dict(map(column_of, words))
     for word in words:
         name, unit = column_of(word)
+        unit = unit or named.get(quantity_of_error(name), "")
         if name not in COLUMNS or name in scales:
             raise Refusal(
                 f"the header must be {HEADER}",
@@ -177,6 +243,16 @@ def _scales(
         header = ",".join(words)
         raise Refusal(f"the header must be {HEADER}", value=header, where=place)
     return scales
+
+
+def quantity_of_error(name: str) -> str:
+    """Return the column whose error is in a column, and whose unit an error without one
+    has; "" for a column that is no error."""
+    if name == "error":
+        return "value"
+    if name.endswith("_error"):
+        return name.removesuffix("_error")
+    return ""
 
 
 def _scale(name: str, unit: str, units: dict[str, float], owner: str) -> float:

@@ -15,6 +15,7 @@ from geomech.core.errors import choose
 from geomech.io.files import read_text
 from geomech.io.rows import ENDINGS
 from geomech.io.toml import tables_of
+from geomech.mathematics.systems.swimmer import MEDIA
 from geomech.scenes.format.columns import columns
 from geomech.scenes.format.key import Word
 from geomech.scenes.format.reader import Source, build
@@ -230,23 +231,29 @@ def plate_drags(place: str, file) -> PlateDrags:
         return PlateDrags(*map(tuple, (np.radians(beta), np.radians(gamma), a_x, a_z)))
 
 
-def medium(name: str) -> PlateStress:
-    """Return a stress map, for bodies in the vertical plane and in `rft.mujoco.attach`.
+def stress_map(name: str) -> PlateStress:
+    """Return a stress map of the vertical plane.
 
     name: of a medium of the catalogue, or of a file: TOML with a table [medium], or
-    with the keys of one alone, or CSV of plate drags. ValueError for anything else.
+    with the keys of one alone, or CSV of plate drags. Refusal for anything else.
 
     Examples
     --------
-    >>> import geomech
-    >>> geomech.medium("poppy-seeds-loose").zeta  # or of "own.toml"
+    >>> from geomech.scenes.terradynamics.stress import stress_map
+    >>> stress_map("poppy-seeds-loose").zeta  # or of "own.toml"
     1.0
     """
     name = str(name)
     if name in VERTICAL:
         return VERTICAL[name].stress
+    if name in MEDIA:
+        raise Refusal(
+            f"{name!r} is a force law for bodies that undulate",
+            where="medium",
+            instead=f"give a stress map: {', '.join(VERTICAL)}, or your own file",
+        )
     if Path(name).suffix.lower() not in (".toml", *ENDINGS) and not Path(name).exists():
-        choose("medium", name, VERTICAL)
+        choose("medium", name, VERTICAL, ".toml")
     return _read_stress(Source("medium"), "medium", name)
 
 
@@ -271,6 +278,13 @@ def _read_stress(source: Source, place: str, file: str) -> PlateStress:
         raise Refusal(
             f"medium must be a table [medium], got {type(table).__name__}",
             where=(place, path.name),
+        )
+    if "law" in table:
+        raise Refusal(
+            f"{path.name} has the force law of a rod, for bodies that undulate",
+            where=place,
+            instead="give plate drags (beta, gamma, alpha_x, alpha_z) in a CSV file, "
+            "or the stress map that 'geomech fit-medium' fits to pushes of a plate",
         )
     if isinstance(table.get("file"), str):
         drags = path.absolute().parent / table["file"]

@@ -70,6 +70,12 @@ def check(scene: Scene, sizes: Sizes) -> None:
         force_unit(scene, loaded(scene, SUBJECT), sizes)
 
 
+def body_length(scene: Scene, sizes: Sizes) -> float | None:
+    """Return the length of the body, m; None where neither the scene nor the sizes have
+    it."""
+    return force_unit(scene, loaded(scene, SUBJECT), sizes).length
+
+
 def cost(scene: Scene) -> Cost:
     """Return the cost of `answer`."""
     jobs = []

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from geomech.core.variables import Result, Variable
-from geomech.scenes.terradynamics.stress import medium as load_medium
+from geomech.scenes.terradynamics.stress import stress_map
 from rft.core.refusal import Refusal
 from rft.terradynamics.plates import Survey, survey
 
@@ -38,7 +38,7 @@ def answer(
 ) -> Result:
     """Return the stress per unit depth at one tilt and direction, degrees, the shares
     of the plane of angles in which the map pulls and pushes, and the map itself."""
-    law = load_medium(medium)
+    law = stress_map(medium)
     overview = survey(law)
     description = f"{medium} {overview.description()}"
     if law.tension == "cut":

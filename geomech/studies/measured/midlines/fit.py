@@ -23,7 +23,7 @@ from geomech.studies.measured.midlines.trial import Trial
 from rft.core.checks import in_range
 
 GAP = 1 / 8  # of a cycle without a frame, at most
-ROWS = 10  # frames a cycle, at least
+ROWS = 10  # frames per cycle, at least
 FEWEST = 3  # cycles that show their scatter
 LEAST_AHEAD = 0.4 * np.pi  # rad of phase in half a cycle
 LIKE = 0.5  # correlation of a cycle with the mean of all, at least
@@ -35,6 +35,7 @@ LEAST_STRIDE = 0.02  # body lengths per cycle: less does not show where a body g
 # Prior probability that a body keeps its length where its motion varies, assumed.
 CONSTANT_LENGTH = 0.6
 WHOLE = 0.995  # of the body's length: such points are taken to reach both ends
+CRUDE_LENGTH = 0.1  # largest relative error of a length from few modes, assumed
 LARGEST_RATIO = 1.4  # of the points' length to a given body length
 
 
@@ -141,9 +142,11 @@ def fit_midlines(
             body_length=body_length,
         )
     trial = smooth.filled(slips.checked(trial, mend))
+    # A wrong unit is refused before the smoothing, which takes seconds.
+    _check_length(trial, smooth.crude_length(trial), CRUDE_LENGTH)
     repeat = period(trial)
     curve, trial = smooth.fitted(trial, repeat)
-    trial = _with_length(trial, curve)
+    _check_length(trial, _length(curve))
     clock = kinematics.clock(curve, repeat)
     if clock.ratio < kinematics.STANDING:
         raise trial.wrong(
@@ -220,27 +223,34 @@ def _turning(t: np.ndarray, headings: np.ndarray) -> float:
     return 2 * np.pi / abs(slope)
 
 
-def _with_length(trial: Trial, curve: smooth.Curve) -> Trial:
-    """Refuse lengths that no body has, or that contradict each other."""
+def _length(curve: smooth.Curve) -> float:
+    """Return the mean length of smooth midlines."""
     tangent = smooth.placed(curve.basis(curve.places, 1), curve.at(curve.t))
-    length = float(np.abs(tangent).mean())
-    if trial.unit == "m" and not SHORTEST < length < LONGEST:
+    return float(np.abs(tangent).mean())
+
+
+def _check_length(trial: Trial, length: float, error: float = 0.0) -> None:
+    """Refuse lengths that no body has, or that contradict each other.
+
+    length: of the points, in the trial's unit. error: its largest relative error."""
+    least = (1 - error) * length
+    most = (1 + error) * length
+    if trial.unit == "m" and not (SHORTEST < most and least < LONGEST):
         raise trial.wrong(
             f"the body is {length:.3g} m long",
             instead="give the unit of x and y with ``units``: mm, cm or px",
         )
-    if trial.unit == "BL" and not 1 / LARGEST_RATIO < length < LARGEST_RATIO:
+    if trial.unit == "BL" and not (1 / LARGEST_RATIO < most and least < LARGEST_RATIO):
         raise trial.wrong(
             f"the body is {length:.3g} body lengths long",
             instead="give the unit of x and y with ``units``",
         )
-    if trial.length is not None and length > LARGEST_RATIO * trial.length:
+    if trial.length is not None and least > LARGEST_RATIO * trial.length:
         raise trial.wrong(
             f"the points extend over {length:.3g}, but the body is {trial.length:.3g} "
             "long",
             instead="give ``body_length`` in the unit of x and y, which ``units`` sets",
         )
-    return trial
 
 
 def full_cycles(

@@ -214,9 +214,10 @@ def _dropped_note(low: np.ndarray, found: int, least: float) -> list[str]:
     """Return a note, which comes first, if many points are dropped by their score."""
     if low.sum() <= MANY * found:
         return []
+    share = 100 * low.sum() / found
     return [
-        f"MANY POINTS ARE LEFT OUT: {low.sum() / found:.2g} of the points that the "
-        f"tracker found have a score below {least:g}; if they are good, lower "
+        f"MANY POINTS ARE LEFT OUT: {share:.3g} % of the points that the tracker found "
+        f"have a score below {least:g}; if they are good, lower "
         "``least_score``"
     ]
 
@@ -228,10 +229,11 @@ def _missing_note(xy: np.ndarray, low: np.ndarray) -> list[str]:
         return []
     score = ""
     if low.any():
-        score = f", {low.mean():.2g} of all because of their likelihood"
+        score = f", {100 * low.mean():.3g} % because of their likelihood"
+    share = 100 * lost.mean()
     return [
-        f"{lost.mean():.2g} of all points are missing{score}: modes along the body "
-        "replace them"
+        f"{share:.3g} % of all points are missing{score}: modes along the body replace "
+        "them"
     ]
 
 
@@ -325,8 +327,8 @@ def _refuse_animals(source: Rows, frame: np.ndarray, program: str = "") -> None:
     counts = np.bincount(frame)
     if (counts > 1).mean() > SEVERAL:
         raise Refusal(
-            f"{int(counts.max())} animals without a track: {(counts > 1).mean():.2g} "
-            "of the times have several rows",
+            f"{int(counts.max())} animals without a track: "
+            f"{100 * (counts > 1).mean():.3g} % of the times have several rows",
             where=source.name,
             instead=UNTRACKED[program or ""],
         )

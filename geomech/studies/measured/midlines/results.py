@@ -27,6 +27,7 @@ LABELS = {
     "wavelength": "measured along the direction of travel",
     "arc_wavelength": "measured along the body",
 }
+GIVEN = "as given"
 SOURCES = ("cycles", "noise", "smoothing")  # of errors
 
 
@@ -75,6 +76,8 @@ def _quantities(fit: Kinematics, units: dict[str, str], label: str) -> list[Vari
             name, (), intervals.value[k], units[name], LABELS[name],
             intervals.half_width[k], error_label=label,
         )  # fmt: skip
+        if name == "body_length" and fit.trial.length is not None:
+            variable = Variable(name, (), fit.trial.length, units[name], GIVEN)
         variables.append(variable)
     noise = float(fit.curve.noise / fit.value("body_length")[0])
     variables.append(Variable("noise", (), noise, "BL", "noise of a point"))

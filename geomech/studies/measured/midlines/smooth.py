@@ -203,13 +203,24 @@ class Solver:
 def crude(trial: Trial) -> np.ndarray:
     """Return headings (F, 8) along the body from few modes frame by frame, less their
     mean, rad."""
+    heading = np.unwrap(np.angle(_crude_tangents(trial)), axis=1)
+    return heading - heading.mean(1, keepdims=True)
+
+
+def crude_length(trial: Trial) -> float:
+    """Return the mean length of the body from few modes frame by frame, in the trial's
+    unit."""
+    return float(np.abs(_crude_tangents(trial)).mean())
+
+
+def _crude_tangents(trial: Trial) -> np.ndarray:
+    """Return derivatives (F, 8) of x + iy by the share of the body's length, at eight
+    places along it."""
     s = _chord_places(trial.points)
     z, triangle, _ = projected(trial.points, s, min(6, len(s) - 1))
     places = (np.arange(8) + 0.5) / 8
     slope = _polynomials(places, len(triangle), 1) @ np.linalg.inv(triangle)
-    tangent = placed(slope, z)
-    heading = np.unwrap(np.angle(tangent), axis=1)
-    return heading - heading.mean(1, keepdims=True)
+    return placed(slope, z)
 
 
 def _chord_places(points: np.ndarray) -> np.ndarray:
