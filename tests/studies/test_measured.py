@@ -4,12 +4,14 @@ import contextlib
 import dataclasses
 import math
 import re
+import shutil
 
 import numpy as np
 import pytest
 import xarray
 from commands import geomech as command
 from scipy.interpolate import CubicSpline
+from scipy.io import netcdf_file
 from scipy.signal import lfilter
 from tabled import of_json, tabled
 
@@ -29,6 +31,7 @@ from geomech.mathematics.geometry.representations.tube import (
     waves,
 )
 from geomech.mathematics.systems import Swimmer, Table
+from geomech.mathematics.systems.capabilities import table_error
 from geomech.results.measured import scene_text
 from geomech.scenes import load
 from geomech.studies import measured
@@ -526,6 +529,20 @@ def test_the_scene_of_a_field_predicts_its_displacement_and_error(usual, field):
     distance = np.hypot(*error[:2])
     assert distance <= table["estimate"]["direct"][0] < 1.5 * distance
     assert error[2] <= table["estimate_heading"]["direct"][0] < 1.5 * error[2]
+
+
+def test_a_field_whose_grid_the_data_miss_has_errors_along_its_gait(
+    usual, field, tmp_path
+):
+    shutil.copy(field / "field.nc", tmp_path / "missed.nc")
+    with netcdf_file(tmp_path / "missed.nc", "a", mmap=False) as file:
+        for name in ("A", "A_error", "fit_residual"):
+            file.variables[name][:] = np.nan
+    cycle = usual.gait.cycle(64)
+    found = table_error(Table(tmp_path / "missed.nc"), *cycle)
+    full = table_error(Table(field / "field.nc"), *cycle)
+    assert (found > 0).all()
+    assert (found <= full).all()
 
 
 def test_what_the_data_do_not_reach_is_refused(field):

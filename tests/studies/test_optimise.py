@@ -461,6 +461,38 @@ def test_the_second_start_goes_along_the_limits_and_all_are_strokes_within_them(
         assert (low >= loops.box[0]).all() and (high <= loops.box[1]).all()
 
 
+def test_outlines_treat_both_joints_and_both_senses_of_each_alike():
+    """Mirror images of outlines are among them, and none is twice."""
+
+    def corners(outline, signs):
+        return frozenset(map(tuple, np.round(np.multiply(outline, signs), 9) + 0.0))
+
+    outlines = {corners(outline, (1, 1)) for outline in series.OUTLINES}
+    assert len(outlines) == len(series.OUTLINES)
+    for signs in ((-1, 1), (1, -1), (-1, -1)):
+        assert {corners(outline, signs) for outline in series.OUTLINES} == outlines
+    assert max(np.abs(outline).max() for outline in series.OUTLINES) == 1.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_least_sweep_of_an_interval_is_the_least_of_its_phases(seed):
+    loops, p = some_loop(seed, phases=48)
+    stroke = Stroke(loops, p)
+    found = stroke.swept(p)
+    # Area per phase, at 21 phases of each interval, and at its edges.
+    half = np.pi / loops.phases
+    shifts = np.linspace(-half, half, 21)
+    dense = []
+    for shift in shifts:
+        moved = series.shifted(p, shift)
+        alpha, alphadot = loops.cycle(moved)
+        (u, v), (du, dv) = ((x @ stroke.plane).T for x in (alpha - p[0], alphadot))
+        dense.append(stroke.side * (u * dv - v * du) / stroke.size)
+    least = np.min(dense, axis=0)
+    np.testing.assert_allclose(found, least, atol=2e-3 * np.ptp(dense))
+    assert (found <= least + 1e-6 * np.ptp(dense)).all()
+
+
 @pytest.mark.parametrize(
     ("text", "limits"),
     [

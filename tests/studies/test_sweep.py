@@ -251,3 +251,22 @@ def test_rows_find_their_points_whatever_varies_fastest_or_changes_nothing():
     amplitude, frequency, length = np.meshgrid(*OVER.values(), indexing="ij")
     expected = np.stack([10 * length, amplitude, 0 * frequency + 1.0], -1)
     np.testing.assert_array_equal(one.arranged(np.array(rows)), expected)
+
+
+@pytest.mark.parametrize("count", [200, 201, 1000, 1999])
+def test_the_least_and_the_largest_of_many_values_are_tried_before_a_sweep(count):
+    """Wherever they stand, and of many values not all."""
+    values = np.random.default_rng(count).permutation(count).astype(float).tolist()
+    over = {"gait.amplitude": [1.0], "body.length": values}
+    tried = [*grid.Grid(None, over, {}, "gait.amplitude").corners()]
+    assert {(0.0,), (count - 1.0,), (values[0],), (values[-1],)} <= {*tried}
+    assert 100 <= len(tried) <= 204
+
+
+def test_every_value_is_tried_with_the_first_of_the_others():
+    one = grid.Grid(None, OVER, {}, "gait.amplitude")
+    tried = {*one.corners()}
+    assert tried == {(f, x) for f in (1.0, 2.0) for x in (1.0, 4.0)} | {
+        (1.0, 2.0),
+        (1.0, 3.0),
+    }
