@@ -116,6 +116,16 @@ def names(text: str) -> set[str]:
     }
 
 
+def in_order(facts: str) -> str:
+    """Return a pattern of messages that have some words, such as "line 3 alpha_1 rad",
+    in their order, with any others between them."""
+    parts = []
+    for word in facts.split():
+        start = r"(?<!\w)" if word[0].isalnum() else ""
+        parts.append(start + re.escape(word))
+    return ".*".join(parts)
+
+
 # Whether two texts say the same.
 
 
