@@ -9,6 +9,7 @@ import pickle
 import numpy as np
 import pytest
 from registry import GAITS, OUTLINES, STRESSES, SYSTEMS
+from words import in_order
 
 import geomech
 import rft
@@ -396,22 +397,25 @@ def assert_refused(call, name):
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda: scenes.load(3), "scene must be a name or a TOML file, got 3"),
-        (lambda: PLAIN.with_numerics(grid="a"), "three-link-viscous: grid must be a"),
-        (lambda: Chain(length="x"), "length must be a number from 1e-15 to 1e.15 m"),
-        (lambda: Chain(lengths=[[1]]), "lengths must be a list of numbers, got ..1.."),
+        (lambda: scenes.load(3), "scene TOML 3"),
+        (lambda: PLAIN.with_numerics(grid="a"), "three-link-viscous grid"),
+        (lambda: Chain(length="x"), "length 1e-15 1e+15 m"),
+        (lambda: Chain(lengths=[[1]]), "lengths [[1]]"),
         (
             lambda: body_velocity("sand", Chain(), STILL, STILL),
-            "medium must be a force",
+            "medium force",
         ),
-        (lambda: Swimmer(lambda v: v, Chain()), "medium must be a force law"),
-        (lambda: PLAIN.changed(gait=[1, 2]), "gait must be a gait such as Circle"),
-        (lambda: direct(len, [1, 2]), "gait must be a gait"),
-        (lambda: Swimmer(Coulomb(), Chain(), effects=["caps"]), "a list of effects"),
+        (lambda: Swimmer(lambda v: v, Chain()), "medium force law"),
+        (lambda: PLAIN.changed(gait=[1, 2]), "gait Circle"),
+        (lambda: direct(len, [1, 2]), "gait"),
+        (
+            lambda: Swimmer(Coulomb(), Chain(), effects=["caps"]),
+            "effects list of effects",
+        ),
     ],
 )
 def test_the_place_is_named(call, said):
-    with pytest.raises(Refusal, match=said):
+    with pytest.raises(Refusal, match=in_order(said)):
         call()
 
 

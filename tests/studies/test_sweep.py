@@ -6,6 +6,7 @@ import itertools
 import numpy as np
 import pytest
 from tabled import swept_table
+from words import in_order
 
 from geomech import scenes
 from geomech.scenes import kinds
@@ -205,22 +206,22 @@ def test_one_frequency_is_that_of_all_effects():
 @pytest.mark.parametrize(
     ("scene", "over", "said"),
     [
-        (GLASS, {"gait.size": [1.0]}, "'size' is unknown"),
-        (GLASS, {"gait": [1.0]}, "use a parameter such as"),
-        (GLASS, {"effects.end-caps.radius": [0.1]}, "no effect 'end-caps'"),
-        (GLASS, {"body.length": [1.0, -1.0]}, "length must be a number from"),
-        (GLASS, {}, "must span 1 to"),
+        (GLASS, {"gait.size": [1.0]}, "size"),
+        (GLASS, {"gait": [1.0]}, "over gait parameter gait."),
+        (GLASS, {"effects.end-caps.radius": [0.1]}, "effect end-caps"),
+        (GLASS, {"body.length": [1.0, -1.0]}, "length number"),
+        (GLASS, {}, "over 1"),
         (
             BOTH,
             {"effects.grain-inertia.frequency": [2.0]},
-            "both (describe|belong to) one swimmer",
+            "grain-inertia",
         ),
-        (BOTH, {"body.length": [0.2]}, r"\[body\] gives length = 0.2 and body-inertia"),
-        (BOTH, {"effects.speed": [2.0]}, "no effect of the scene gives 'speed'"),
+        (BOTH, {"body.length": [0.2]}, "[body] length = 0.2 body-inertia"),
+        (BOTH, {"effects.speed": [2.0]}, "effect speed"),
     ],
 )
 def test_bad_sweeps_are_refused(scene, over, said):
-    with pytest.raises(Refusal, match=said):
+    with pytest.raises(Refusal, match=in_order(said)):
         sweep.sweep(scene, over)
 
 
