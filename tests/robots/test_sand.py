@@ -367,8 +367,26 @@ def meshed(points, body="<freejoint/>"):
     return model_of(geom, AT_ONCE, asset)
 
 
+RATIOS = [1.0, 2.0, 4.0, 20.0]
+N_ELEMENTS = {  # of geoms of these ratios
+    "box": [432, 416, 348, 224],
+    "ellipsoid": [320, 320, 320, 320],
+    "capsule": [384, 360, 256, 512],
+    "cylinder": [336, 336, 160, 416],
+    "disc": [336, 336, 224, 224],
+}
+
+
+@pytest.mark.parametrize("kind", N_ELEMENTS)
+def test_a_geom_has_as_few_elements_as_its_error_allows(kind):
+    """Their number is what a step costs; the next test measures the error."""
+    models = [slender(kind, ratio) for ratio in RATIOS]
+    counts = [len(mesh_of_elements(model, 0).faces) for model in models]
+    assert counts == N_ELEMENTS[kind]
+
+
 @needs_numba
-@pytest.mark.parametrize("ratio", [1.0, 2.0, 4.0, 20.0])
+@pytest.mark.parametrize("ratio", RATIOS)
 @pytest.mark.parametrize(
     "kind", ["box", "ellipsoid", "capsule", "cylinder", "disc", "mesh"]
 )
