@@ -372,7 +372,8 @@ def write_mat(path: Path, result: Result) -> None:
 def read_mat(path: Path) -> Result:
     from scipy.io import loadmat
 
-    file = loadmat(path, simplify_cells=True)
+    # As text: of a path that is missing SciPy says that it is none.
+    file = loadmat(str(path), appendmat=False, simplify_cells=True)
     descriptions = json.loads(str(file["geomech"]["variables"]))
     variables = []
     for name, description in descriptions.items():

@@ -130,6 +130,8 @@ def test_changing_frame_is_solving_in_that_frame(medium, mean, frame):
     h, hdot = mean.frame_pose(frame, alpha, alphadot)
     carried = coordinates.change_velocity(here, h, hdot)
     np.testing.assert_allclose(carried, there, atol=1e-8)
+    velocity = coordinates.in_frame(lambda *_: here, lambda *_: (h, hdot))
+    np.testing.assert_array_equal(velocity(alpha, alphadot), carried)
 
 
 @pytest.mark.parametrize("phases", [8, 9])

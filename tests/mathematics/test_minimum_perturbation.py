@@ -17,6 +17,8 @@ from geomech.mathematics.geometry.minimum_perturbation import (
 from geomech.mathematics.geometry.representations.field import Field
 from geomech.mathematics.systems import Swimmer
 from geomech.mathematics.tiers.area import area
+from geomech.mathematics.tiers.base import Numerics
+from geomech.scenes.frames import framed
 from geomech.studies.maps import fields
 from geomech.studies.scene_tables import SceneTables
 from rft import Chain, Viscous
@@ -131,3 +133,12 @@ def test_frames_that_contradict_each_other_are_refused():
     text = text.replace("minimum-perturbation", "link-2")
     with pytest.raises(Refusal, match="but the scene's frame = 'link-2'"):
         scenes.parse(text.replace('"chain"', '"chain"\nframe = "minimum-perturbation"'))
+
+
+@pytest.mark.parametrize(("joints", "most"), [(2, 1414), (3, 125), (4, 13), (6, 5)])
+def test_it_is_refused_on_a_grid_that_takes_too_long(joints, most):
+    """Beyond 2 million shapes, of more than three joints beyond 30,000."""
+    swimmer = Swimmer(FLUID, Chain((1.0,) * (joints + 1)))
+    framed(swimmer, Numerics(grid=most))
+    with pytest.raises(Refusal, match="grid"):
+        framed(swimmer, Numerics(grid=most + 1))

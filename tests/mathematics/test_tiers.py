@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from registry import GAITS, MEDIA
 from tabled import tabled
+from words import in_order
 
 from geomech import plots, scenes
 from geomech.mathematics.gaits import Butterfly, Circle, Fourier
@@ -91,27 +92,27 @@ GRID = connection.grid(2, 5)
     [
         (
             lambda f: family.fit(f, Circle(), 0.5, 6, 16).area([0.6]),
-            "from 0 to the largest of the family, 0.5",
+            "0 family 0.5",
         ),
         (
             lambda f: family.fit(f, Circle(), 0.5, 6, 16, least=-0.5).area([-0.6]),
-            "must lie from -0.5 to the largest of the family, 0.5",
+            "-0.5 family 0.5",
         ),
         (lambda f: family.fit(f, Circle(), 0.0), "largest amplitude"),
         (
             lambda f: harmonics.fit(f, GRID, 24, highest=4),
-            "harmonics must be odd and below the number of directions",
+            "harmonics odd directions",
         ),
-        (lambda f: harmonics.fit(f, GRID, highest=5, count=5), "below the number of d"),
+        (lambda f: harmonics.fit(f, GRID, highest=5, count=5), "harmonics directions"),
         (
             lambda f: cheapest_displacements(GLASS, [1.0], 1e-15),
-            "no tier reaches 1e-15 body lengths",
+            "tier 1e-15",
         ),
-        (lambda f: cheapest_displacements(GLASS, [1.0], 0.0), "tolerance must be"),
+        (lambda f: cheapest_displacements(GLASS, [1.0], 0.0), "tolerance"),
     ],
 )
 def test_what_no_table_or_tier_reaches_is_refused(make, said):
-    with pytest.raises(ValueError, match=said):
+    with pytest.raises(ValueError, match=in_order(said)):
         make(FLUID.system.velocity)
 
 

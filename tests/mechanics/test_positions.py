@@ -3,6 +3,7 @@ backbones that are built in."""
 
 import numpy as np
 import pytest
+from words import in_order
 
 import geomech
 from geomech.mathematics.gaits import Circle
@@ -90,14 +91,14 @@ def test_parameters_of_a_function_are_keys_of_its_scene(tmp_path):
         (
             lambda alpha: [["x"] * 3] * 3,
             {},
-            "positions must be an array of real numbers",
+            "positions real",
         ),
-        (hinged, {"frame": "link-4"}, "frame must be 'mean' or 'link-1' ... 'link-3'"),
-        (hinged, {"lengths": (1, -1, 1)}, "lengths must all be finite and > 0"),
+        (hinged, {"frame": "link-4"}, "frame mean link-1 link-3"),
+        (hinged, {"lengths": (1, -1, 1)}, "lengths finite 0"),
     ],
 )
 def test_functions_that_return_no_poses_are_refused(function, given, says):
-    with pytest.raises(Refusal, match=says):
+    with pytest.raises(Refusal, match=in_order(says)):
         Positions(function, 2, **({"lengths": (1, 1, 1)} | given))
 
 

@@ -53,20 +53,30 @@ CALLS = {
     "poses of a tier": lambda: SceneTables(STUDY).poses("direct", amplitudes=ANGLES),
     "data": lambda: rod_drag(ANGLES, [1.0, 1.0], [1.0, 1.0]),
     "stress": lambda: plates.StressMap()(ANGLES, 0.5),
-    "poses of a plate": lambda: plates.loads(plates.StressMap(), plates.Plate(0.1, 0.1), POSES, POSES),
+    "poses of a plate": lambda: plates.loads(
+        plates.StressMap(), plates.Plate(0.1, 0.1), POSES, POSES
+    ),
     "spatial stress": lambda: law.alpha_of_angles(ANGLES, 0.5, 0.5),
     "vertices": lambda: meshes.Mesh(POSES, [[0, 1, 2]]),
-}  # fmt: skip
-CALLS |= {f"shape of {name}": lambda gait=gait: gait.shape(ANGLES) for name, gait in GAITS.examples().items()}  # fmt: skip
-CALLS |= {f"rate of {name}": lambda gait=gait: gait.rate(ANGLES) for name, gait in GAITS.examples().items()}  # fmt: skip
+}
+CALLS |= {
+    f"shape of {name}": lambda gait=gait: gait.shape(ANGLES)
+    for name, gait in GAITS.examples().items()
+}
+CALLS |= {
+    f"rate of {name}": lambda gait=gait: gait.rate(ANGLES)
+    for name, gait in GAITS.examples().items()
+}
 CALLS |= {
     f"traction of {name}": lambda law=law: law.traction(ANGLES, 0.0)
     for name, law in LAWS.examples().items()
 }
 CALLS |= {
-    f"velocity of {name}": lambda x=x: x.velocity(np.ma.array(np.full(x.joints, 0.1), mask=True), np.ones(x.joints))
+    f"velocity of {name}": lambda x=x: x.velocity(
+        np.ma.array(np.full(x.joints, 0.1), mask=True), np.ones(x.joints)
+    )
     for name, x in SYSTEMS.examples().items()
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", CALLS)

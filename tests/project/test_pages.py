@@ -135,8 +135,14 @@ def test_commands_on_all_pages_exist_with_their_options_and_names():
 # up above.
 DRAWN = {"run", "ccf", "trajectory"}
 FIRST = README, SITE / "start.md"  # pages for somebody who types a first command
-TYPED = {" ".join(line): line for page in FIRST for line in commands(page) if len(line) > 1 and line[0] not in DRAWN
-         and not any(re.search(r"\b[A-Z]{3,}\b", word) for word in line)}  # fmt: skip
+TYPED = {
+    " ".join(line): line
+    for page in FIRST
+    for line in commands(page)
+    if len(line) > 1
+    and line[0] not in DRAWN
+    and not any(re.search(r"\b[A-Z]{3,}\b", word) for word in line)
+}
 
 
 @pytest.mark.parametrize(

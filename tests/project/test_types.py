@@ -9,6 +9,7 @@ import pickle
 import numpy as np
 import pytest
 from registry import GAITS, OUTLINES, STRESSES, SYSTEMS
+from words import in_order
 
 import geomech
 import rft
@@ -36,58 +37,148 @@ from rft.terradynamics.plates import SHAPES, Drag, Path, Penetrate, Rotate
 from rft.terradynamics.walking import Fineness, Rhex, Roller, Screws, Tripod, Walker
 
 WRONG = {
-    "None": None, "text": "x", "digits": "12", "bytes": b"1", "empty": [], "list": [1.0, 2.0, 3.0, 4.0, 5.0], "deep": [[1.0]],
-    "ragged": [[1.0], 2.0], "words": ["1", "2"], "dict": {"a": 1}, "object": object(), "function": lambda x: x, "class": Chain,
-    "complex": 1j, "nan": math.nan, "inf": math.inf, "true": True, "huge": 10**400, "endless": 10**5000,
-    "array": np.eye(2), "many": np.zeros((40, 40)), "numpy nan": np.float32("nan"), "set": {1.0, 2.0},
+    "None": None,
+    "text": "x",
+    "digits": "12",
+    "bytes": b"1",
+    "empty": [],
+    "list": [1.0, 2.0, 3.0, 4.0, 5.0],
+    "deep": [[1.0]],
+    "ragged": [[1.0], 2.0],
+    "words": ["1", "2"],
+    "dict": {"a": 1},
+    "object": object(),
+    "function": lambda x: x,
+    "class": Chain,
+    "complex": 1j,
+    "nan": math.nan,
+    "inf": math.inf,
+    "true": True,
+    "huge": 10**400,
+    "endless": 10**5000,
+    "array": np.eye(2),
+    "many": np.zeros((40, 40)),
+    "numpy nan": np.float32("nan"),
+    "set": {1.0, 2.0},
     "date": np.datetime64("2020"),
-}  # fmt: skip
+}
 RHEX = Rhex(0.2, 0.15, 0.03, 0.06, OUTLINES["c-leg"], (-0.05, 0.05))
 SCREWS = Screws(0.2, 0.15, 0.12, 0.03, meshes.Screw(0.03, 0.01, 0.02, 0.1, 0.003), 0.1)
 PARTS = {
-    "Granular": Granular(1.8, 0.24), "Surface": rft.Surface(0.2, 0.06, 9.0), "Viscous": Viscous(),
-    "Table": rft.Table((0, 0.4, 0.8, 1.5), (1, 1, 0.7, 0), (0, 1, 2, 3)), "Chain": Chain(), "Backbone": rft.Backbone(8),
-    "Serpenoid": rft.Serpenoid(8), "ConstantCurvature": rft.ConstantCurvature(8), "SkinFriction": rft.SkinFriction(),
-    "EndCaps": rft.EndCaps(0.06), "DepthProfile": rft.DepthProfile(), "GrainInertia": rft.GrainInertia(1.0, 0.1, 0.1),
-    "BodyInertia": rft.BodyInertia(1.0, 1.0, 1.0, 1.0), "Transient": rft.Transient(0.1), "TowedSled": rft.TowedSled(0.1),
+    "Granular": Granular(1.8, 0.24),
+    "Surface": rft.Surface(0.2, 0.06, 9.0),
+    "Viscous": Viscous(),
+    "Table": rft.Table((0, 0.4, 0.8, 1.5), (1, 1, 0.7, 0), (0, 1, 2, 3)),
+    "Chain": Chain(),
+    "Backbone": rft.Backbone(8),
+    "Serpenoid": rft.Serpenoid(8),
+    "ConstantCurvature": rft.ConstantCurvature(8),
+    "SkinFriction": rft.SkinFriction(),
+    "EndCaps": rft.EndCaps(0.06),
+    "DepthProfile": rft.DepthProfile(),
+    "GrainInertia": rft.GrainInertia(1.0, 0.1, 0.1),
+    "BodyInertia": rft.BodyInertia(1.0, 1.0, 1.0, 1.0),
+    "Transient": rft.Transient(0.1),
+    "TowedSled": rft.TowedSled(0.1),
     "Incline": rft.Slope(0.2),
-    "DisturbedGround": rft.DisturbedGround(0.05, 0.1), "Numerics": Numerics(), "Solver": Solver(),
-    "Swimmer": Swimmer(Coulomb(), Chain()), "Scene": Scene(Swimmer(Coulomb(), Chain()), Circle()),
+    "DisturbedGround": rft.DisturbedGround(0.05, 0.1),
+    "Numerics": Numerics(),
+    "Solver": Solver(),
+    "Swimmer": Swimmer(Coulomb(), Chain()),
+    "Scene": Scene(Swimmer(Coulomb(), Chain()), Circle()),
     "table, system": SYSTEMS["table"],
-    **{name: SYSTEMS[name] for name in ("no-slip-snake", "differential-drive", "ideal-fluid-swimmer", "floating-chain")},
-    "Sine": Sine(elements=8), **{type(gait).__name__: gait for gait in GAITS.values()},
-    **{name: OUTLINES[name] for name in SHAPES}, **{name: STRESSES[name] for name in ("generic", "measured")},
-    "Outline": OUTLINES["c-leg"].outline(3), "Drag": Drag(0.1), "Penetrate": Penetrate(0.1), "Rotate": Rotate(0.1),
+    **{
+        name: SYSTEMS[name]
+        for name in (
+            "no-slip-snake",
+            "differential-drive",
+            "ideal-fluid-swimmer",
+            "floating-chain",
+        )
+    },
+    "Sine": Sine(elements=8),
+    **{type(gait).__name__: gait for gait in GAITS.values()},
+    **{name: OUTLINES[name] for name in SHAPES},
+    **{name: STRESSES[name] for name in ("generic", "measured")},
+    "Outline": OUTLINES["c-leg"].outline(3),
+    "Drag": Drag(0.1),
+    "Penetrate": Penetrate(0.1),
+    "Rotate": Rotate(0.1),
     "Path": Path((0, 1, 2), (0, 1, 2), (0, 1, 0)),
     "IntruderScene": IntruderScene(STRESSES["generic"], OUTLINES["plate"], Drag(0.1)),
-    "Aeration": ground.Aeration(0.01, 0.03), "GrainPressure": ground.GrainInertia(), "Slope": ground.Slope(0.1),
-    "DisturbedPlaces": ground.DisturbedGround((0.0,), 0.02, 0.5), "Spatial": meshes.Spatial(3e5),
-    "Sphere": meshes.Sphere(0.02), "Cylinder": meshes.Cylinder(0.02, 0.1), "Screw": meshes.Screw(0.03, 0.01, 0.02, 0.1),
-    "Leg": meshes.Leg(0.04, 0.02, 0.003), "SpatialDrag": meshes.Drag(0.1), "SpatialPenetrate": meshes.Penetrate(0.1),
-    "SpatialRotate": meshes.Rotate(0.1), "SpatialPath": meshes.Path(*[(0, 1, 2)] * 4),
-    "MeshScene": MeshScene(meshes.Spatial(3e5), meshes.Sphere(0.02), meshes.Drag(0.1), triangles=20),
-    "Tripod": Tripod(2.0), "Rhex": RHEX, "Roller": Roller(1.0, OUTLINES["wheel"]), "Screws": SCREWS, "Fineness": Fineness(),
+    "Aeration": ground.Aeration(0.01, 0.03),
+    "GrainPressure": ground.GrainInertia(),
+    "Slope": ground.Slope(0.1),
+    "DisturbedPlaces": ground.DisturbedGround((0.0,), 0.02, 0.5),
+    "Spatial": meshes.Spatial(3e5),
+    "Sphere": meshes.Sphere(0.02),
+    "Cylinder": meshes.Cylinder(0.02, 0.1),
+    "Screw": meshes.Screw(0.03, 0.01, 0.02, 0.1),
+    "Leg": meshes.Leg(0.04, 0.02, 0.003),
+    "SpatialDrag": meshes.Drag(0.1),
+    "SpatialPenetrate": meshes.Penetrate(0.1),
+    "SpatialRotate": meshes.Rotate(0.1),
+    "SpatialPath": meshes.Path(*[(0, 1, 2)] * 4),
+    "MeshScene": MeshScene(
+        meshes.Spatial(3e5), meshes.Sphere(0.02), meshes.Drag(0.1), triangles=20
+    ),
+    "Tripod": Tripod(2.0),
+    "Rhex": RHEX,
+    "Roller": Roller(1.0, OUTLINES["wheel"]),
+    "Screws": SCREWS,
+    "Fineness": Fineness(),
     "Walker": Walker(RHEX, Tripod(2.0), STRESSES["generic"]),
     "WalkerScene": WalkerScene(STRESSES["generic"], RHEX, Tripod(2.0)),
-}  # fmt: skip
+}
 RIGHT = {  # what looks wrong and is not
-    ("Rhex", "inertia", "None"), ("Rhex", "aside", "None"), ("Fineness", "engine", "None"),
+    ("Rhex", "inertia", "None"),
+    ("Rhex", "aside", "None"),
+    ("Fineness", "engine", "None"),
     ("harmonics", "None"),
-    ("centre", "empty"), ("reverse", "true"), ("directions", "None"), ("cycles", "None"), ("effects", "empty"), ("k", "None"),
-    ("covariance", "None"), ("Granular", "covariance", "array"), ("Viscous", "covariance", "deep"),
-    *((type(gait).__name__, "frequency", "None") for gait in (*GAITS.values(), Sine(elements=8))),
-    ("Chain", "lengths", "list"), ("masses", "empty"), ("inertias", "empty"),
-    ("along", "list"), ("cos", "array"), ("sin", "array"), ("modes", "None"), ("modes", "array"),
-    ("Chain", "waves", "None"), ("EndCaps", "across", "None"), ("differential-drive", "track", "None"),
-    *((name, "length", "None") for name in ("Chain", "Backbone", "Serpenoid", "ConstantCurvature", "Positions")),
-    *((name, "length", "None") for name in ("no-slip-snake", "ideal-fluid-swimmer", "floating-chain")),
+    ("centre", "empty"),
+    ("reverse", "true"),
+    ("directions", "None"),
+    ("cycles", "None"),
+    ("effects", "empty"),
+    ("k", "None"),
+    ("covariance", "None"),
+    ("Granular", "covariance", "array"),
+    ("Viscous", "covariance", "deep"),
+    *(
+        (type(gait).__name__, "frequency", "None")
+        for gait in (*GAITS.values(), Sine(elements=8))
+    ),
+    ("Chain", "lengths", "list"),
+    ("masses", "empty"),
+    ("inertias", "empty"),
+    ("along", "list"),
+    ("cos", "array"),
+    ("sin", "array"),
+    ("modes", "None"),
+    ("modes", "array"),
+    ("Chain", "waves", "None"),
+    ("EndCaps", "across", "None"),
+    ("differential-drive", "track", "None"),
+    *(
+        (name, "length", "None")
+        for name in ("Chain", "Backbone", "Serpenoid", "ConstantCurvature", "Positions")
+    ),
+    *(
+        (name, "length", "None")
+        for name in ("no-slip-snake", "ideal-fluid-swimmer", "floating-chain")
+    ),
     *((name, "None") for name in ("radius_m", "travel_m", "distance_m", "slope_per_m")),
-    ("closed", "true"), ("Path", "angle", "empty"),
-    ("places", "list"), *itertools.product(("SpatialPath",), ("rx", "ry", "rz"), ("empty",)),
-    ("smooth_normals", "None"), ("body_length", "None"),
-    ("table, system", "body", "None"), ("table, system", "medium", "None"), ("Shchf", "file", "None"),
+    ("closed", "true"),
+    ("Path", "angle", "empty"),
+    ("places", "list"),
+    *itertools.product(("SpatialPath",), ("rx", "ry", "rz"), ("empty",)),
+    ("smooth_normals", "None"),
+    ("body_length", "None"),
+    ("table, system", "body", "None"),
+    ("table, system", "medium", "None"),
+    ("Shchf", "file", "None"),
     *itertools.product(("name", "text", "matched"), ("text", "digits")),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("kind", PARTS)
@@ -118,15 +209,26 @@ STILL = np.zeros(2)
 
 
 TAKEN = {
-    *itertools.product(("threads", "cycles", "amplitudes", "gait of the scene", "a change"), ["None"]),
+    *itertools.product(
+        ("threads", "cycles", "amplitudes", "gait of the scene", "a change"), ["None"]
+    ),
     *itertools.product(["amplitudes"], ("empty", "list", "deep", "array", "many")),
-    *itertools.product(["amplitudes of a study"], ("empty", "list")), ("tiers", "empty"), ("tiers", "None"),
-    *itertools.product(("alpha", "alphadot", "shape"), ["array"]), *itertools.product(["times"], ("empty", "list")),
-    ("effects", "empty"), ("progress", "None"), ("progress", "function"), ("a list", "list"), ("rate", "array"),
-    *itertools.product(["family's amplitudes"], ("empty", "deep", "many")), ("rate", "deep"),
+    *itertools.product(["amplitudes of a study"], ("empty", "list")),
+    ("tiers", "empty"),
+    ("tiers", "None"),
+    *itertools.product(("alpha", "alphadot", "shape"), ["array"]),
+    *itertools.product(["times"], ("empty", "list")),
+    ("effects", "empty"),
+    ("progress", "None"),
+    ("progress", "function"),
+    ("a list", "list"),
+    ("rate", "array"),
+    *itertools.product(["family's amplitudes"], ("empty", "deep", "many")),
+    ("rate", "deep"),
     # a body that is registered already
-    ("family's amplitudes", "array"), ("part", "class"),
-}  # fmt: skip
+    ("family's amplitudes", "array"),
+    ("part", "class"),
+}
 
 
 CYCLE = np.zeros((8, 2))
@@ -295,22 +397,25 @@ def assert_refused(call, name):
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda: scenes.load(3), "scene must be a name or a TOML file, got 3"),
-        (lambda: PLAIN.with_numerics(grid="a"), "three-link-viscous: grid must be a"),
-        (lambda: Chain(length="x"), "length must be a number from 1e-15 to 1e.15 m"),
-        (lambda: Chain(lengths=[[1]]), "lengths must be a list of numbers, got ..1.."),
+        (lambda: scenes.load(3), "scene TOML 3"),
+        (lambda: PLAIN.with_numerics(grid="a"), "three-link-viscous grid"),
+        (lambda: Chain(length="x"), "length 1e-15 1e+15 m"),
+        (lambda: Chain(lengths=[[1]]), "lengths [[1]]"),
         (
             lambda: body_velocity("sand", Chain(), STILL, STILL),
-            "medium must be a force",
+            "medium force",
         ),
-        (lambda: Swimmer(lambda v: v, Chain()), "medium must be a force law"),
-        (lambda: PLAIN.changed(gait=[1, 2]), "gait must be a gait such as Circle"),
-        (lambda: direct(len, [1, 2]), "gait must be a gait"),
-        (lambda: Swimmer(Coulomb(), Chain(), effects=["caps"]), "a list of effects"),
+        (lambda: Swimmer(lambda v: v, Chain()), "medium force law"),
+        (lambda: PLAIN.changed(gait=[1, 2]), "gait Circle"),
+        (lambda: direct(len, [1, 2]), "gait"),
+        (
+            lambda: Swimmer(Coulomb(), Chain(), effects=["caps"]),
+            "effects list of effects",
+        ),
     ],
 )
 def test_the_place_is_named(call, said):
-    with pytest.raises(Refusal, match=said):
+    with pytest.raises(Refusal, match=in_order(said)):
         call()
 
 

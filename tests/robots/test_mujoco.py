@@ -191,6 +191,21 @@ def test_a_robot_that_is_thrown_up_is_airborne():
 
 
 @needs_numba
+def test_a_walk_that_repeats_itself_goes_on_in_equal_steps():
+    """Its last stride again and again, up to the end of the time."""
+    simulation = Simulation(
+        Walker(ROD, Tripod(1.0), XPLORER.medium), dataclasses.replace(QUICK, steps=8)
+    )
+    found = simulation.walk(20, 24.1)
+    assert found.periodic and found.cycles < 20
+    np.testing.assert_allclose(found.t, np.arange(8 * 24 + 1) / 8, atol=1e-9)
+    assert len(found.spatial["states"]) == len(found.pose) == len(found.t)
+    strides = np.diff(found.pose[::8, 0])[-18:]
+    np.testing.assert_allclose(strides, found.speed, rtol=1e-6)
+    np.testing.assert_allclose(found.pose[-1, 1:], found.pose[-9, 1:], atol=1e-9)
+
+
+@needs_numba
 def test_a_plain_wheel_rolls_as_fast_as_the_grains_bear_it():
     """Against the balance of forces of a wheel of 400 elements, with the slip at which
     it pulls nothing; both engines tell their error."""

@@ -35,6 +35,7 @@ from rft.terradynamics.plates.stress import COEFFICIENTS
 mujoco = pytest.importorskip(
     "mujoco", reason="needs the extra: pip install 'geomech[mujoco]'"
 )
+from rft.mujoco.ground import footprints  # noqa: E402
 from rft.mujoco.ground.selection import overlap_note  # noqa: E402
 from rft.mujoco.media import law_of  # noqa: E402
 from rft.mujoco.sand import meshes  # noqa: E402
@@ -367,8 +368,26 @@ def meshed(points, body="<freejoint/>"):
     return model_of(geom, AT_ONCE, asset)
 
 
+RATIOS = [1.0, 2.0, 4.0, 20.0]
+N_ELEMENTS = {  # of geoms of these ratios
+    "box": [432, 416, 348, 224],
+    "ellipsoid": [320, 320, 320, 320],
+    "capsule": [384, 360, 256, 512],
+    "cylinder": [336, 336, 160, 416],
+    "disc": [336, 336, 224, 224],
+}
+
+
+@pytest.mark.parametrize("kind", N_ELEMENTS)
+def test_a_geom_has_as_few_elements_as_its_error_allows(kind):
+    """Their number is what a step costs; the next test measures the error."""
+    models = [slender(kind, ratio) for ratio in RATIOS]
+    counts = [len(mesh_of_elements(model, 0).faces) for model in models]
+    assert counts == N_ELEMENTS[kind]
+
+
 @needs_numba
-@pytest.mark.parametrize("ratio", [1.0, 2.0, 4.0, 20.0])
+@pytest.mark.parametrize("ratio", RATIOS)
 @pytest.mark.parametrize(
     "kind", ["box", "ellipsoid", "capsule", "cylinder", "disc", "mesh"]
 )
@@ -506,6 +525,41 @@ def test_prints_in_a_world_that_is_turned_are_turned():
 
 
 START = [0.5, 0.2, 0, 0, 0, 0]
+
+
+@pytest.mark.parametrize("place", [(0, 0), (4, 0), (2, 1), (0, 5), (4, 5), (2, 3)])
+def test_a_heap_slides_to_the_angle_of_repose_wherever_it_is(place):
+    """Also at the edges, from which no ground is lost."""
+    prints = footprints.Footprints(0.1, 0.6, 0.5)
+    size = footprints.HEAD + footprints.PER_GEOM + footprints.PER_CELL * 30
+    memory = footprints.memory_of(np.zeros(size), 1, *prints.shape)
+    memory.ground[place] = 0.3
+    footprints.extend_box(memory.head[footprints.BOX :], *place, 1, *prints.shape)
+    for step in range(2000):
+        memory.head[footprints.STAMP] = step
+        footprints.slide(memory, prints.grid, np.zeros(prints.shape), prints.grid[4])
+    ground = memory.ground
+    assert ground.sum() == pytest.approx(0.3)
+    steepest = 0.1 * math.tan(prints.repose) * (1 + 2 * footprints.STEEPER)
+    for drop in (np.diff(ground, axis=0), np.diff(ground, axis=1)):
+        assert np.abs(drop).max() < steepest
+    for drop in (ground[1:, 1:] - ground[:-1, :-1], ground[1:, :-1] - ground[:-1, 1:]):
+        assert np.abs(drop).max() < math.sqrt(2) * steepest
+    assert memory.head[footprints.BOX + 1] == 0.0  # nothing slides any more
+
+
+def test_bodies_that_a_model_has_bear_what_their_geoms_bear():
+    model = model_of(BALL)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    with rft.mujoco.attach(model, MAP) as sand:
+        assert sand.wrench(data, 0).tolist() == [0.0] * 6  # of the world, no geom
+        assert sand.wrench(data, 1)[2] > 0
+        for body in (-1, 2, "nobody"):
+            with pytest.raises(rft.Refusal, match=str(body)):
+                sand.wrench(data, body)
+
+
 SMALL_PRINTS = {"rounding": 0.02, "footprints": rft.mujoco.Footprints(0.01, 0.4, 0.4)}
 
 

@@ -16,6 +16,7 @@ from tasks import (
     fails_oddly,
     meets,
     notes,
+    waits,
     who,
 )
 
@@ -141,6 +142,19 @@ def test_a_signal_at_any_moment_leaves_nobody_waiting(milliseconds, monkeypatch)
         signal.signal(signal.SIGALRM, before)
     worker.join(20)
     assert not worker.is_alive()
+
+
+def test_the_end_of_a_pool_ends_its_tasks(tmp_path):
+    with contextlib.closing(executors.Processes(2)) as executor:
+        tasks = [executor.submit(waits, str(tmp_path), k) for k in range(2)]
+        workers = [*executor.pool._processes.values()]
+        while len([*tmp_path.iterdir()]) < 2:
+            assert not any(task.done() for task in tasks)
+    for worker in workers:
+        worker.join(20)
+        assert not worker.is_alive()
+    assert executor.pool is None
+    executor.close()
 
 
 @pytest.mark.timeout(20)

@@ -84,25 +84,61 @@ def test_a_scene_goes_into_the_medium_of_a_file(folder, monkeypatch):
 
 BAD = {
     "no such file": (FILE, {}, "cannot read 'M.toml': No such file"),
-    "no name": ('file = 3', {}, 'give text in "quotes" instead of 3'),
+    "no name": ("file = 3", {}, 'give text in "quotes" instead of 3'),
     "no TOML": (FILE, {"M_toml": "C = "}, "M.toml is not TOML"),
     "deep": (FILE, {"M_toml": "a = " + "[" * 5000}, "is not TOML"),
     "huge": (FILE, {"M_toml": MEDIUM + "#" * 1_000_001}, "larger than 1 MB"),
     "a CSV": ('file = "T.csv"', {"T_csv": csv()}, 'add law = "table"'),
-    "a scene": (FILE, {"M_toml": MEDIUM + REST}, "must contain one table [medium] and nothing else"),
+    "a scene": (
+        FILE,
+        {"M_toml": MEDIUM + REST},
+        "must contain one table [medium] and nothing else",
+    ),
     "no medium": (FILE, {"M_toml": "x = 1"}, "names no medium"),
-    "wrong key": (FILE, {"M_toml": MEDIUM.replace("C =", "c =")}, "key: 'c' is unknown"),
-    "covariance": (FILE, {"M_toml": MEDIUM.replace("0.02,", "-0.02,")}, "covariance must be symmetric"),
+    "wrong key": (
+        FILE,
+        {"M_toml": MEDIUM.replace("C =", "c =")},
+        "key: 'c' is unknown",
+    ),
+    "covariance": (
+        FILE,
+        {"M_toml": MEDIUM.replace("0.02,", "-0.02,")},
+        "covariance must be symmetric",
+    ),
     "table without": ('law = "table"', {}, "[medium]"),
-    "table with": (TABLE + "\nf_t = [1]", {"T_csv": csv()}, "give either 'file' or 'psi', 'f_t', 'f_n'"),
-    "columns": (TABLE, {"T_csv": csv("psi_deg,f_t,lift")}, "T.csv, line 2: the header has no column f_n"),
-    "nan": (TABLE, {"T_csv": csv().replace("90.0,", "nan,")}, "T.csv, line 15: a row must be 3 finite numbers"),
+    "table with": (
+        TABLE + "\nf_t = [1]",
+        {"T_csv": csv()},
+        "give either 'file' or 'psi', 'f_t', 'f_n'",
+    ),
+    "columns": (
+        TABLE,
+        {"T_csv": csv("psi_deg,f_t,lift")},
+        "T.csv, line 2: the header has no column f_n",
+    ),
+    "nan": (
+        TABLE,
+        {"T_csv": csv().replace("90.0,", "nan,")},
+        "T.csv, line 15: a row must be 3 finite numbers",
+    ),
     "swapped": (TABLE, {"T_csv": csv("psi_deg,f_n,f_t")}, "the columns are swapped"),
-    "radians": (TABLE, {"T_csv": csv("psi,f_t,f_n").replace("psi,", "psi_deg,")}, "look like radians"),
-    "half": (TABLE, {"T_csv": "psi_deg,f_t,f_n\n0,1,0\n20,1,1\n40,1,2\n60,0.4,2\n"}, "within 15 degrees of 0, one within 15 degrees of 90"),
+    "radians": (
+        TABLE,
+        {"T_csv": csv("psi,f_t,f_n").replace("psi,", "psi_deg,")},
+        "look like radians",
+    ),
+    "half": (
+        TABLE,
+        {"T_csv": "psi_deg,f_t,f_n\n0,1,0\n20,1,1\n40,1,2\n60,0.4,2\n"},
+        "within 15 degrees of 0, one within 15 degrees of 90",
+    ),
     "pushes": (TABLE, {"T_csv": csv() + "45,-9,1\n"}, "drives the motion"),
-    "no drag": (TABLE, {"T_csv": "psi_deg,f_t,f_n\n0,0,0\n45,0,0\n90,0,0\n"}, "there is no drag"),
-}  # fmt: skip
+    "no drag": (
+        TABLE,
+        {"T_csv": "psi_deg,f_t,f_n\n0,0,0\n45,0,0\n90,0,0\n"},
+        "there is no drag",
+    ),
+}
 
 
 @pytest.mark.parametrize("name", BAD)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from words import in_order
 
 from geomech.io import rows
 from geomech.mathematics.gaits import frames
@@ -48,13 +49,25 @@ FORMS = {
     "UTF-16": (PLAIN.encode("utf-16"), "UTF-16"),
     "UTF-16, no mark": (PLAIN.encode("utf-16-le"), "UTF-16"),
     "line of units": (PLAIN.replace("_N\n", "_N\nmm,N\n"), "line 2 contains units"),
-    "units below": (PLAIN.replace("depth_mm,force_N", "Depth,Force\n[mm],[N]"), "units"),
-    "logger": (HEAD + PLAIN + "End (:", "header in line 4.*line 10 at the end of the file"),
+    "units below": (
+        PLAIN.replace("depth_mm,force_N", "Depth,Force\n[mm],[N]"),
+        "units",
+    ),
+    "logger": (
+        HEAD + PLAIN + "End (:",
+        "header in line 4.*line 10 at the end of the file",
+    ),
     "cut off": (PLAIN + "3.75", "line 7 at the end of the file is incomplete"),
-    "other names": (PLAIN.replace("depth_mm,force_N", "Sinkage (mm),Force / N"), "Sinkage"),
+    "other names": (
+        PLAIN.replace("depth_mm,force_N", "Sinkage (mm),Force / N"),
+        "Sinkage",
+    ),
     "ends": (PLAIN.replace("\n", ",\n"), ""),
     "comment": ("# " + PLAIN, "comment in line 1 is read as the header"),
-    "letters": (PLAIN.replace("\n", ",µ\n").replace("_N,µ", "_N,größe").encode("cp1252"), "1252"),
+    "letters": (
+        PLAIN.replace("\n", ",µ\n").replace("_N,µ", "_N,größe").encode("cp1252"),
+        "1252",
+    ),
     "micrometres": (
         "depth (µm),force_N\n"
         + "".join(f"{1e3 * d:.2f},{f}\n" for d, f in zip(DEPTH, FORCE)),
@@ -65,7 +78,7 @@ FORMS = {
         + "".join(f"{d},{1e-6 * f:.9f}\n" for d, f in zip(DEPTH, FORCE)),
         "",
     ),
-}  # fmt: skip
+}
 
 
 def written(path: Path, text: str | bytes) -> Path:
@@ -115,19 +128,37 @@ def test_cells_that_only_python_takes_for_numbers_are_refused(cell, tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("depth_mm\tforce_N\n1,234\t5,678\n2,345\t6,789\n", "line 2: '1,234' may have a decimal comma or thousands separators"),
-        ('depth_mm,force_N\n"1,234","5,678"\n2,3\n', "line 2: '1,234' may have a decimal comma or thousands separators"),
-        ("depth_mm;force_N\n0,5;1.5\n1,5;2,5\n", "line 2: a row must be 2 finite numbers"),
-        ("depth_mm,force_N\nm,N\n1,2\n2,3\n", "line 2: depth_mm is in m here: keep one"),
-        ("1,2\n2,3\n", "line 1: the file has no header: its first line has 2 numbers"),
-        ("t,force_N\n1,2\n", "no column depth: the columns are 't, force_N'; it must have depth_m,force_N"),
-        ("depth (N),force_N\n1,2\n", "line 1: column depth .N. is in 'N': give it in m or cm"),
-        ("depth_mm,force_N\n1,2\n2\n3,4\n", "line 3: a row must be 2"),
-        ("Operator,5\ndepth_mm,force_N\n1,x\n2,3\n3,4\n", "line 3: a row must be 2"),
+        (
+            "depth_mm\tforce_N\n1,234\t5,678\n2,345\t6,789\n",
+            "line 2 1,234 decimal comma separators",
+        ),
+        (
+            'depth_mm,force_N\n"1,234","5,678"\n2,3\n',
+            "line 2 1,234 decimal comma separators",
+        ),
+        (
+            "depth_mm;force_N\n0,5;1.5\n1,5;2,5\n",
+            "line 2 row 2 finite",
+        ),
+        (
+            "depth_mm,force_N\nm,N\n1,2\n2,3\n",
+            "line 2 depth_mm m",
+        ),
+        ("1,2\n2,3\n", "line 1 file header first line 2"),
+        (
+            "t,force_N\n1,2\n",
+            "depth columns t force_N depth_m,force_N",
+        ),
+        (
+            "depth (N),force_N\n1,2\n",
+            "line 1 column depth N m cm",
+        ),
+        ("depth_mm,force_N\n1,2\n2\n3,4\n", "line 3 row 2"),
+        ("Operator,5\ndepth_mm,force_N\n1,x\n2,3\n3,4\n", "line 3 row 2"),
     ],
-)  # fmt: skip
+)
 def test_what_leaves_a_doubt_is_refused_by_place(text, said, tmp_path):
-    with pytest.raises(Refusal, match=said):
+    with pytest.raises(Refusal, match=in_order(said)):
         penetration.read(rows.read(written(tmp_path / "p.csv", text), 10_000, ""))
 
 
@@ -280,25 +311,25 @@ WCON = {"units": {"t": "s", "x": "mm", "y": "mm"}, "data": [{"id": "1", "t": [0.
         (
             "a.h5",
             b"\x89HDF\r\n\x1a\n\0\0",
-            "HDF5 file: export CSV from SLEAP .*DeepLabCut",
+            "HDF5 file CSV SLEAP DeepLabCut",
         ),
         (
             "a.wcon",
             json.dumps(WCON).encode(),
-            "a WCON file .JSON.: write one row t,point",
+            "WCON file row",
         ),
-        ("a.json", b'[{"x": 1}]', "it is JSON"),
-        ("a.xlsx", b"PK\x03\x04\x14\0", "spreadsheet.*: save the sheet as CSV"),
-        ("a.bag", b"#ROSBAG V2.0\n", "a ROS bag"),
+        ("a.json", b'[{"x": 1}]', "JSON"),
+        ("a.xlsx", b"PK\x03\x04\x14\0", "spreadsheet CSV"),
+        ("a.bag", b"#ROSBAG V2.0\n", "ROS"),
         (
             "sysf_three_link.m",
             b"function out = sysf()",
-            "a MATLAB program.*drag_ratio",
+            "MATLAB drag_ratio",
         ),
     ],
 )
 def test_files_of_other_programs_are_known(name, raw, said, tmp_path):
-    with pytest.raises(Refusal, match=said):
+    with pytest.raises(Refusal, match=in_order(said)):
         reader.read(written(tmp_path / name, raw))
 
 

@@ -10,6 +10,7 @@ import frozen
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from words import in_order
 
 import geomech
 import rft
@@ -67,19 +68,19 @@ def test_a_scene_is_made_of_what_there_is(parts, expected):
 @pytest.mark.parametrize(
     ("parts", "says"),
     [
-        ((3,), "3 do not form a scene: give the name"),
-        ((CHAIN,), "^Chain.* do not form a scene"),
-        ((SAND, CHAIN, 4), "Granular.*, 4 do not form a scene: give"),
-        (("sand", CHAIN), "medium: 'sand' is unknown"),
+        ((3,), "3 scene"),
+        ((CHAIN,), "Chain scene"),
+        ((SAND, CHAIN, 4), "Granular 4 scene"),
+        (("sand", CHAIN), "medium sand"),
         (
             ("viscous-2", rft.Backbone(30)),
-            "no default gait exists for a body of 29 joints",
+            "gait 29 joints",
         ),
-        (("three-link-glas",), "did you mean"),
+        (("three-link-glas",), "did you mean three-link-glass"),
     ],
 )
 def test_what_makes_no_scene_is_refused(parts, says):
-    with pytest.raises(Refusal, match=says):
+    with pytest.raises(Refusal, match=in_order(says)):
         geomech.study(*parts)
 
 
@@ -135,21 +136,21 @@ def test_the_examples_of_a_study_run():
     [
         (
             lambda: geomech.optimise("three-link-viscous", limits=0.0),
-            "three-link-viscous: limits must be a number from",
+            "three-link-viscous limits number",
         ),
-        (lambda: geomech.fit_log("log.csv", body_length=-1), "body_length must be"),
+        (lambda: geomech.fit_log("log.csv", body_length=-1), "body_length"),
         (
             lambda: geomech.fit_medium("short-rod-drag", raduis=0.1),
-            "fit_medium has no 'raduis': .*'radius'",
+            "fit_medium raduis radius",
         ),
         (
             lambda: geomech.displacement("three-link-viscous", tolerence=1e-3),
-            "no 'tolerence': did you mean 'tolerance'",
+            "tolerence tolerance",
         ),
     ],
 )
 def test_a_refusal_names_the_argument(ask, said):
-    with pytest.raises(Refusal, match=said):
+    with pytest.raises(Refusal, match=in_order(said)):
         ask()
 
 

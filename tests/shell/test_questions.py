@@ -273,6 +273,32 @@ def test_every_switch_of_a_picture_draws_or_is_refused(result, tmp_path):
             assert pictures[0] == pictures[1], name
 
 
+NOT_DRAWN = {
+    "displacement": [{"data": FROZEN / "gone.csv", "component": ("x",)}],
+    "run": [
+        {"data": FROZEN / "gone.csv", "component": ("x",)},
+        {"clim": 0.1, "component": ("x", "theta")},
+    ],
+    "ccf": [
+        {"style": "quiver"},
+        {"clim": 0.1, "component": ("x", "theta")},
+        {"stretch": True, "style": "slices"},
+    ],
+    "connection": [{"style": "map"}, {"clim": 0.1, "component": ("x", "theta")}],
+}
+
+
+@pytest.mark.parametrize(
+    ("kind", "picture"),
+    [(kind, picture) for kind, pictures in NOT_DRAWN.items() for picture in pictures],
+)
+def test_a_picture_that_cannot_be_is_refused_before_anything_is_computed(kind, picture):
+    question = questions.question(kind)(subject_of(kind))
+    with pytest.raises((Refusal, FileNotFoundError)):
+        question.check_draw(**picture)
+    question.check_draw()
+
+
 def test_a_method_of_a_study_asks_the_same(form, asked, result):
     if not hasattr(geomech.Study, asked.name) or asked.subject is None:
         pytest.skip("it is not asked of a scene")
@@ -334,6 +360,40 @@ def test_a_result_made_by_hand_is_read_back(ending, tmp_path):
     back = geomech.load_result(tmp_path / f"a{ending}")
     assert_same(MADE, back)
     assert dict(back.attributes) == dict(MADE.attributes)
+
+
+@pytest.mark.parametrize("name", ["a.png", "a", "a.toml"])
+def test_a_name_whose_ending_is_no_format_is_refused_with_those_that_are(
+    name, tmp_path
+):
+    (tmp_path / name).write_text("")
+    for ask in (MADE.save, geomech.load_result):
+        with pytest.raises(Refusal, match=r"\.json"):
+            ask(tmp_path / name)
+
+
+@pytest.mark.parametrize("ending", [".nc", ".json", ".mat", ".csv"])
+def test_what_is_missing_is_missing_and_what_is_damaged_is_refused(ending, tmp_path):
+    file = tmp_path / f"a{ending}"
+    with pytest.raises(FileNotFoundError):
+        geomech.load_result(file)
+    MADE.only("xi").save(file)
+    file.write_bytes(file.read_bytes()[:10] + b"\xff{")
+    with pytest.raises(Refusal, match=re.escape(file.name)):
+        geomech.load_result(file)
+
+
+def test_a_data_frame_has_its_coordinates_as_index():
+    frame = MADE.only("speed").to_dataframe()
+    assert frame.index.names == ["phase", "tier"]
+    assert frame["speed"].loc[1.5].tolist() == [2.0, 3.0]
+    assert MADE.to_dataframe("component")["xi"].tolist() == [0.5, 0.25, 0.0]
+
+
+def test_without_pandas_it_is_said(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(ImportError, match="pip install pandas"):
+        MADE.to_dataframe()
 
 
 def test_places_are_chosen_by_their_coordinates():

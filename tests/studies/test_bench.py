@@ -6,6 +6,7 @@ import pickle
 import numpy as np
 import pytest
 from registry import BODIES, EFFECTS, GAITS, MEDIA, SYSTEMS
+from words import in_order
 
 import rft
 from geomech import scenes
@@ -137,27 +138,27 @@ GAIT = '\n[gait]\nkind = "circle"'
     [
         (
             PLAIN.replace('"chain"', '"chain"\nlength = 0.2') + SIZES,
-            r"\[body\] length = 0.2, but \[physical\] length = 0.1",
+            "[body] length = 0.2 [physical] length = 0.1",
         ),
         (
             PLAIN + SIZES + CAPS + "radius_m = 1.0",
-            r"effects\]\] radius_m = 1.0, but \[physical\] radius_m = 0.006: keep one",
+            "[[effects]] radius_m = 1.0 [physical] radius_m = 0.006",
         ),
-        (PLAIN + "[physical]\nmass = 1.0", r"\[physical\] mass: no part of this scene"),
-        (PLAIN + "[physical]\nmas = 1.0", r"\[physical\] key: 'mas' is unknown: did"),
-        ("frame = 3\n" + PLAIN, r"\[body\] Expected `str`, got `int`"),
+        (PLAIN + "[physical]\nmass = 1.0", "[physical] mass part"),
+        (PLAIN + "[physical]\nmas = 1.0", "[physical] mas did you mean mass"),
+        ("frame = 3\n" + PLAIN, "[body] str int"),
         (
             'frame = "link-1"\n'
             + PLAIN.replace('"chain"', '"chain"\nframe = "link-2"'),
-            "but the scene's frame = 'link-1'",
+            "scene frame = 'link-1'",
         ),
-        (PLAIN + SNAKE, "a no-slip-snake takes no 'body'"),
-        (SWIMMER + GAIT, r"the table \[medium\] is missing"),
-        (SNAKE + GAIT + '\n[numerics]\nloads = "exact"', "'loads' is unknown"),
+        (PLAIN + SNAKE, "no-slip-snake body"),
+        (SWIMMER + GAIT, "[medium] missing"),
+        (SNAKE + GAIT + '\n[numerics]\nloads = "exact"', "loads unknown"),
     ],
 )
 def test_contradictions_and_strangers_are_refused(text, said):
-    with pytest.raises(Refusal, match=said):
+    with pytest.raises(Refusal, match=in_order(said)):
         scenes.parse(text)
 
 

@@ -4,14 +4,17 @@ import contextlib
 import dataclasses
 import math
 import re
+import shutil
 
 import numpy as np
 import pytest
 import xarray
 from commands import geomech as command
 from scipy.interpolate import CubicSpline
+from scipy.io import netcdf_file
 from scipy.signal import lfilter
 from tabled import of_json, tabled
+from words import in_order
 
 import geomech
 import rft
@@ -29,6 +32,7 @@ from geomech.mathematics.geometry.representations.tube import (
     waves,
 )
 from geomech.mathematics.systems import Swimmer, Table
+from geomech.mathematics.systems.capabilities import table_error
 from geomech.results.measured import scene_text
 from geomech.scenes import load
 from geomech.studies import measured
@@ -203,11 +207,14 @@ def test_what_is_cut_off_below_the_noise_is_an_error():
 @pytest.mark.parametrize(
     ("truth", "gait", "asked", "wanted"),
     [
-        ("viscous", GAIT, {}, 0.95), ("sand", GAIT, {}, 0.93), ("sand", gaits.Butterfly(amplitude=0.7), {"spread": 0.03}, 0.95),
-        ("sand", gaits.Circle(amplitude=1.0), {}, 0.95), ("sand", gaits.Circle(amplitude=1.0), {"spread": 0.1}, 0.95),
+        ("viscous", GAIT, {}, 0.95),
+        ("sand", GAIT, {}, 0.93),
+        ("sand", gaits.Butterfly(amplitude=0.7), {"spread": 0.03}, 0.95),
+        ("sand", gaits.Circle(amplitude=1.0), {}, 0.95),
+        ("sand", gaits.Circle(amplitude=1.0), {"spread": 0.1}, 0.95),
     ],
     indirect=["truth"],
-)  # fmt: skip
+)
 def test_intervals_of_A_cover_it_in_logs_made_otherwise(truth, gait, asked, wanted):
     shares = [
         covered_at_all_phases(wandering(truth, gait, seed=k, **asked), truth)
@@ -224,12 +231,24 @@ def test_intervals_of_A_cover_it_in_logs_made_otherwise(truth, gait, asked, want
         ("viscous", GAIT, {}, 0.93, 0.93),
         ("viscous", GAIT, {"cycles": 14}, 0.93, 0.93),
         ("viscous", GAIT, {"noise": 5e-3}, 0.93, 0.93),
-        ("viscous", gaits.Butterfly(amplitude=0.7), {"spread": 0.03, "samples": 60}, 0.93, 0.93),
+        (
+            "viscous",
+            gaits.Butterfly(amplitude=0.7),
+            {"spread": 0.03, "samples": 60},
+            0.93,
+            0.93,
+        ),
         ("sand", GAIT, {}, 0.95, 0.88),
-        ("sand", gaits.Butterfly(amplitude=0.7), {"spread": 0.03, "samples": 60}, 0.95, 0.88),
+        (
+            "sand",
+            gaits.Butterfly(amplitude=0.7),
+            {"spread": 0.03, "samples": 60},
+            0.95,
+            0.88,
+        ),
     ],
     indirect=["truth"],
-)  # fmt: skip
+)
 def test_intervals_cover_the_truth_in_many_logs(truth, gait, asked, least, least_net):
     # In sand, too, where A has corners at which links begin and cease to stick.
     net, A = covered(truth, range(100), gait=gait, **{"cycles": 60, **asked})
@@ -305,11 +324,16 @@ def test_cycles_that_do_not_vary_tell_the_displacement_and_no_more(viscous):
 def wave(alpha, alphadot):
     """A body of three joints, whose A has all entries."""
     a, b, c = np.moveaxis(alpha, -1, 0)
-    A = np.stack([
-        np.stack([0.2 + 0.1 * np.sin(a + b), 0.1 * np.cos(b - c), -0.15 * np.sin(c)], -1),
-        np.stack([0.1 * a * b, 0.3 - 0.1 * np.cos(c), 0.1 * np.sin(a - b)], -1),
-        np.stack([0.3 + 0.1 * c, -0.2 * np.cos(a), 0.25 + 0.1 * np.sin(b)], -1),
-    ], -2)  # fmt: skip
+    A = np.stack(
+        [
+            np.stack(
+                [0.2 + 0.1 * np.sin(a + b), 0.1 * np.cos(b - c), -0.15 * np.sin(c)], -1
+            ),
+            np.stack([0.1 * a * b, 0.3 - 0.1 * np.cos(c), 0.1 * np.sin(a - b)], -1),
+            np.stack([0.3 + 0.1 * c, -0.2 * np.cos(a), 0.25 + 0.1 * np.sin(b)], -1),
+        ],
+        -2,
+    )
     return np.einsum("...ij,...j->...i", A, alphadot)
 
 
@@ -368,7 +392,7 @@ def tied(rows, noise, spread=0.05):
 
 SUM = (
     [[1, 1]],
-    "alpha_3 is 1 alpha_1 \\+ 1 alpha_2, apart from .* leave alpha_3 out of the columns$",
+    "alpha_3 1 alpha_1 + 1 alpha_2 alpha_3 columns",
 )
 
 
@@ -379,16 +403,20 @@ SUM = (
         (
             1e-3,
             [[1, -1], [0.5, 2]],
-            "alpha_3 is 1 alpha_1 - 1 alpha_2, alpha_4 is 0.5 alpha_1 \\+ 2 alpha_2, .* leave alpha_3, alpha_4 out",
+            "alpha_3 1 alpha_1 - 1 alpha_2 alpha_4 0.5 alpha_1 + 2 alpha_2 alpha_3 alpha_4",
         ),
-        (1e-2, [[0.4, -0.3, 1]], "alpha_4 is 0.4 alpha_1 - 0.3 alpha_2 \\+ 1 alpha_3, apart"),
+        (
+            1e-2,
+            [[0.4, -0.3, 1]],
+            "alpha_4 0.4 alpha_1 - 0.3 alpha_2 + 1 alpha_3",
+        ),
     ],
-)  # fmt: skip
+)
 def test_joints_that_follow_from_others_are_named(noise, rows, said):
     f = measured.fit_log(tied(rows, noise))
     # Noise moves the third digit.
     found = re.sub(r"\d\.\d+", lambda x: f"{float(x[0]):.1g}", results.status(f))
-    assert re.match("fitted only along the gait: " + said, found)
+    assert re.match("fitted only along the gait: " + in_order(said), found)
 
 
 @pytest.mark.parametrize(
@@ -462,9 +490,14 @@ def test_pieces_of_a_long_spline_are_the_whole():
 @pytest.mark.parametrize(
     ("count", "level", "factor"),
     [
-        (8, 0.95, 2.2010), (64, 0.95, 2.2010), (15, 0.9, 1.7189), (16, 0.9, 1.7959), (128, 0.95, 2.0687), (1, 0.5, 0.8165),
+        (8, 0.95, 2.2010),
+        (64, 0.95, 2.2010),
+        (15, 0.9, 1.7189),
+        (16, 0.9, 1.7959),
+        (128, 0.95, 2.0687),
+        (1, 0.5, 0.8165),
     ],
-)  # fmt: skip
+)
 def test_intervals_are_those_of_tables_of_students_t(count, level, factor):
     found = regression.interval_factor(count, level)
     assert found == pytest.approx(factor, abs=1e-4)
@@ -528,15 +561,27 @@ def test_the_scene_of_a_field_predicts_its_displacement_and_error(usual, field):
     assert error[2] <= table["estimate_heading"]["direct"][0] < 1.5 * error[2]
 
 
+def test_a_field_whose_grid_the_data_miss_has_errors_along_its_gait(
+    usual, field, tmp_path
+):
+    shutil.copy(field / "field.nc", tmp_path / "missed.nc")
+    with netcdf_file(tmp_path / "missed.nc", "a", mmap=False) as file:
+        for name in ("A", "A_error", "fit_residual"):
+            file.variables[name][:] = np.nan
+    cycle = usual.gait.cycle(64)
+    found = table_error(Table(tmp_path / "missed.nc"), *cycle)
+    full = table_error(Table(field / "field.nc"), *cycle)
+    assert (found > 0).all()
+    assert (found <= full).all()
+
+
 def test_what_the_data_do_not_reach_is_refused(field):
     scene = load(field / "mine.toml")
-    with refused(r"the data do not reach alpha = \(0.2, -0.1\), which is \d"):
+    with refused(in_order("alpha 0.2 -0.1")):
         scene.system.velocity(np.array([0.2, -0.1]), np.array([1.0, 0.0]))
-    with refused(
-        "area tier integrates a field, and A is known only near the mean gait"
-    ):
+    with refused(in_order("area tier A mean gait")):
         SceneTables(scene).poses("area")
-    with refused("there is only one gait to search"):
+    with refused(in_order("one gait")):
         optimise(scene, "displacement")
 
 
@@ -565,24 +610,30 @@ def test_lengths_and_signs_of_a_field(usual, field):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda d: d.drop_vars("gait_slope"), "no gait_slope that matches it"),
-        (lambda d: d.assign(gait_beyond=d.gait_beyond.expand_dims("more")), "no gait_beyond that matches it"),
-        (lambda d: d.assign(gait_spread=d.gait_spread * (2 * d.joint - 3)), "parts do not match"),
-        (lambda d: d.isel(normal=[0, 0]), "parts do not match"),
-        (lambda d: d.isel({d.gait_A.dims[-1]: slice(1, None)}), "parts do not match"),
-        (lambda d: d.isel(along_and_across=[0, 1, 1]), "parts do not match"),
-        (lambda d: d.assign_attrs(level=1.0), "parts do not match"),
-        (lambda d: d.assign_attrs(level=b"most"), "parts do not match"),
-        (lambda d: d.assign_attrs(error_factor=0.0), "parts do not match"),
-        (lambda d: d.assign_attrs(error_factor=1e6), "parts do not match"),
-        (lambda d: d.assign_attrs(error_factor=[2.0, 2.0]), "parts do not match"),
-        (lambda d: d.assign(gait=0 * d.gait), "a gait that does not move"),
+        (lambda d: d.drop_vars("gait_slope"), "gait_slope"),
+        (
+            lambda d: d.assign(gait_beyond=d.gait_beyond.expand_dims("more")),
+            "gait_beyond",
+        ),
+        (
+            lambda d: d.assign(gait_spread=d.gait_spread * (2 * d.joint - 3)),
+            "gait parts",
+        ),
+        (lambda d: d.isel(normal=[0, 0]), "gait parts"),
+        (lambda d: d.isel({d.gait_A.dims[-1]: slice(1, None)}), "gait parts"),
+        (lambda d: d.isel(along_and_across=[0, 1, 1]), "gait parts"),
+        (lambda d: d.assign_attrs(level=1.0), "gait parts"),
+        (lambda d: d.assign_attrs(level=b"most"), "gait parts"),
+        (lambda d: d.assign_attrs(error_factor=0.0), "gait parts"),
+        (lambda d: d.assign_attrs(error_factor=1e6), "gait parts"),
+        (lambda d: d.assign_attrs(error_factor=[2.0, 2.0]), "gait parts"),
+        (lambda d: d.assign(gait=0 * d.gait), "gait move"),
     ],
-)  # fmt: skip
+)
 def test_parts_of_a_gait_that_do_not_fit_are_refused(change, said, field, tmp_path):
     with xarray.open_dataset(field / "field.nc", engine="scipy") as data:
         change(data).to_netcdf(tmp_path / "bad.nc", engine="scipy")
-    with refused(said):
+    with refused(in_order(said)):
         tables.load(tmp_path / "bad.nc")
 
 
@@ -625,36 +676,94 @@ def late(rows):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda r: np.delete(r, slice(100, 120), 0), "line 101: no rows for 0.7 after this one .*, its only gap: cut"),
-        (lambda r: np.delete(r, [*range(100, 120), *range(220, 230)], 0), "line 101: .*, the longest of 2 gaps: cut"),
-        (lambda r: r[: 9 * 30 + 15], "7 full cycles, .*, are too few: give at least 10 in all"),
-        (lambda r: r[[*range(100), 101, 100, *range(102, 300)]], "line 103: t = .* comes after .*: sort the rows by time"),
-        (changed(0, lambda r: r[0, 0], slice(99, 101)), "line 102: t = .* is given twice: keep one"),
-        (changed(5, lambda r: np.degrees(r[:, 5]) % 360), "line 3: heading jumps by 359.3, a full turn in degrees: say degrees"),
-        (changed(2, lambda r: 0.3 - 0.5 * r[:, 1] + noise(r)), "alpha_2 is -0.5 times alpha_1, apart from a constant and noise"),
-        (changed(2, lambda r: 0.2 + noise(r)), "alpha_2 does not move beyond its noise: leave it out with columns"),
-        (changed(2, lambda r: r[:, 0] / 14 + noise(r)), "alpha_2 drifts from 0.1.* to 0.8.* over the log and oscillates by"),
-        (changed(slice(3, 5), lambda r: 1e12 * r[:, 3:5]), "entries of A reach .*: give x and y in body"),
-        (changed(2, lambda r: 0.4), "alpha_2 does not move"),
-        (changed(slice(3, 6), lambda r: 0.0), "x, y and heading do not move"),
-        (changed(4, lambda r: np.nan, [77]), "line 79: a row must be .*, column y, got .*: correct that row, or remove it"),
-        (lambda r: r[: 8 * 30 + 15], r"the joints repeat 8\.. times: give at least 10 cycles"),
-        (lambda r: r[::4], "7.6 rows per cycle are too few: give at least 12"),
-        (changed(3, lambda r: r[:, 3] + 1, [200]), "line 202: x differs by .* from the rows before and after: correct that row"),
-        (changed(4, lambda r: r[:, 4] - 1, slice(202, None)), "line 204: y jumps by -1 to this row: the tracking slipped"),
-        (changed(0, lambda r: 1e-9 * r[:, 0]), "the joints repeat every .*e-09 where t is in s: give t in s"),
-        (changed(0, lambda r: 100 + r[:, 0] + 0.3 * late(r)), "the joints repeat every 1.01 .* every 1.28 in the last: it contains two"),
-        (changed(0, lambda r: r[:, 0] + late(r)), "line 33: the gait pauses, slips or runs backwards .*: cut out pauses"),
-        (changed(1, lambda r: 0.4 * r[:, 1] - 1, slice(200, None)), "line 202: alpha_1 jumps by .* two gaits"),
         (
-            changed(slice(1, 3), lambda r: 1.25 * r[:, 1:3] - 0.25 * GAIT.middle, slice(205, None)),
-            "line 212: two gaits: 6 cycles are of one kind and 6 of another, which begins here .t = 7.; give",
+            lambda r: np.delete(r, slice(100, 120), 0),
+            "line 101 rows 0.7 gap",
+        ),
+        (
+            lambda r: np.delete(r, [*range(100, 120), *range(220, 230)], 0),
+            "line 101 2 gaps",
+        ),
+        (
+            lambda r: r[: 9 * 30 + 15],
+            "7 full cycles few 10",
+        ),
+        (
+            lambda r: r[[*range(100), 101, 100, *range(102, 300)]],
+            "line 103 t = rows time",
+        ),
+        (
+            changed(0, lambda r: r[0, 0], slice(99, 101)),
+            "line 102 t = twice",
+        ),
+        (
+            changed(5, lambda r: np.degrees(r[:, 5]) % 360),
+            "line 3 heading jumps 359.3 full degrees degrees",
+        ),
+        (
+            changed(2, lambda r: 0.3 - 0.5 * r[:, 1] + noise(r)),
+            "alpha_2 -0.5 times alpha_1 constant noise",
+        ),
+        (
+            changed(2, lambda r: 0.2 + noise(r)),
+            "alpha_2 move noise columns",
+        ),
+        (
+            changed(2, lambda r: r[:, 0] / 14 + noise(r)),
+            "alpha_2 drifts 0.1 0.8",
+        ),
+        (
+            changed(slice(3, 5), lambda r: 1e12 * r[:, 3:5]),
+            "A reach x y body",
+        ),
+        (changed(2, lambda r: 0.4), "alpha_2 move"),
+        (changed(slice(3, 6), lambda r: 0.0), "x y heading move"),
+        (
+            changed(4, lambda r: np.nan, [77]),
+            "line 79 row column y row",
+        ),
+        (
+            lambda r: r[: 8 * 30 + 15],
+            "joints repeat 8. times 10 cycles",
+        ),
+        (lambda r: r[::4], "7.6 rows cycle few 12"),
+        (
+            changed(3, lambda r: r[:, 3] + 1, [200]),
+            "line 202 x differs",
+        ),
+        (
+            changed(4, lambda r: r[:, 4] - 1, slice(202, None)),
+            "line 204 y jumps -1 row",
+        ),
+        (
+            changed(0, lambda r: 1e-9 * r[:, 0]),
+            "joints repeat t s",
+        ),
+        (
+            changed(0, lambda r: 100 + r[:, 0] + 0.3 * late(r)),
+            "joints repeat 1.01 1.28 last two",
+        ),
+        (
+            changed(0, lambda r: r[:, 0] + late(r)),
+            "line 33 gait pauses",
+        ),
+        (
+            changed(1, lambda r: 0.4 * r[:, 1] - 1, slice(200, None)),
+            "line 202 alpha_1 jumps two gaits",
+        ),
+        (
+            changed(
+                slice(1, 3),
+                lambda r: 1.25 * r[:, 1:3] - 0.25 * GAIT.middle,
+                slice(205, None),
+            ),
+            "line 212 two gaits 6 cycles 6 another = 7",
         ),
     ],
-)  # fmt: skip
+)
 def test_bad_logs_get_one_line(change, said, short, tmp_path):
     path = written(tmp_path / "log.csv", short, change=change)
-    with refused("^log.csv(, |: ).*" + said) as caught:
+    with refused("^log.csv(, |: ).*" + in_order(said)) as caught:
         measured.fit_log(path)
     assert "\n" not in str(caught.value)
 
@@ -678,11 +787,15 @@ def columns_of(path, header, rows=120, value=0.0, column=1):
         ("t a2 a1 a10 x y heading", "a1 a2 a10", True),
         ("time q_2_deg q_1_deg yaw_deg y_m x_m", "q_1_deg q_2_deg", True),
         ("phase angle1 angle2 x y theta", "angle1 angle2", False),
-        ("phase time_s joint1_rad joint2_rad x y heading_deg", "joint1_rad joint2_rad", True),
+        (
+            "phase time_s joint1_rad joint2_rad x y heading_deg",
+            "joint1_rad joint2_rad",
+            True,
+        ),
         ("alpha_1 alpha_2 a1 a2 x y heading t", "alpha_1 alpha_2", True),
         ("t_s b1 b2 joint3 joint1 x y yaw", "joint1 joint3", True),
     ],
-)  # fmt: skip
+)
 @pytest.mark.filterwarnings("ignore:.*joint angles are at most")
 def test_columns_are_known_by_their_names(header, joints, seconds, tmp_path):
     log = measured.read(columns_of(tmp_path / "log.csv", header))
@@ -693,33 +806,65 @@ def test_columns_are_known_by_their_names(header, joints, seconds, tmp_path):
 @pytest.mark.parametrize(
     ("header", "columns", "said"),
     [
-        ("t a1 a2 x y", "", "line 1: no column heading: the columns are 't, a1, a2, x, y'; name them t,alpha_1"),
-        ("t b1 b2 x y yaw", "", "line 1: no columns of joint angles, but a gait is a loop of two or more: the columns are"),
-        ("t a1 bend x y yaw", "", "line 1: one column of joint angles, but a gait is"),
-        ("t a1 a2 a1 x y yaw", "", "line 1: the column 'a1' appears twice"),
-        ("t a1 a2 x y yaw theta", "", "line 1: both yaw and theta could be the column heading"),
-        ("t a b x y c", "t a b x y d", "line 1: no column 'd'; the columns are 't, a, b, x, y, c'"),
-        ("t a x y c", "t a x y c", "columns must list t, two or more joint angles"),
-        ("t a b x y c", "t a a x y c", "columns must list t"),
-        ("t a1 a2 a3 a4 a5 a6 a7 x y yaw", "", "7 joint angles, more than 6"),
-        ("t a1 a2 x_mm y yaw", "", "line 1: x_mm and y have different units"),
-        ("t a1 a2 x_px y_px yaw", "", "line 1: the name of x_px gives the unit px: give x and y in body lengths"),
-        ("t a1 a2 x_N y_N yaw", "", "line 1: the name of x_n gives the unit N"),
-        ("t a1_mm a2_mm x y yaw", "", "line 1: the name of a1_mm gives the unit mm: give angles in rad, or in degrees"),
-        ("t a1_deg a2 x y yaw", "", "line 1: a2 has no unit, but other joints have one"),
-        ("hello", "", "no header of columns: give a CSV file with a header such as t,alpha_1,alpha_2,x,y,heading"),
+        (
+            "t a1 a2 x y",
+            "",
+            "line 1 column heading columns t a1 a2 x y t,alpha_1",
+        ),
+        (
+            "t b1 b2 x y yaw",
+            "",
+            "line 1 columns joint gait two columns",
+        ),
+        ("t a1 bend x y yaw", "", "line 1 column joint gait"),
+        ("t a1 a2 a1 x y yaw", "", "line 1 column a1 twice"),
+        (
+            "t a1 a2 x y yaw theta",
+            "",
+            "line 1 yaw theta column heading",
+        ),
+        (
+            "t a b x y c",
+            "t a b x y d",
+            "line 1 column d columns t b x y c",
+        ),
+        ("t a x y c", "t a x y c", "columns t two joint"),
+        ("t a b x y c", "t a a x y c", "columns t"),
+        ("t a1 a2 a3 a4 a5 a6 a7 x y yaw", "", "7 joint 6"),
+        ("t a1 a2 x_mm y yaw", "", "line 1 x_mm y different units"),
+        (
+            "t a1 a2 x_px y_px yaw",
+            "",
+            "line 1 x_px unit px x y body",
+        ),
+        ("t a1 a2 x_N y_N yaw", "", "line 1 x_n unit N"),
+        (
+            "t a1_mm a2_mm x y yaw",
+            "",
+            "line 1 a1_mm unit mm rad degrees",
+        ),
+        (
+            "t a1_deg a2 x y yaw",
+            "",
+            "line 1 a2 unit joints",
+        ),
+        (
+            "hello",
+            "",
+            "header columns CSV file header t,alpha_1,alpha_2,x,y,heading",
+        ),
     ],
-)  # fmt: skip
+)
 def test_columns_that_a_log_lacks_are_named(header, columns, said, tmp_path):
     path = columns_of(tmp_path / "log.csv", header, column=0)
-    with refused("^log.csv.*" + said):
+    with refused("^log.csv.*" + in_order(said)):
         measured.read(path, columns=columns.split())
 
 
 def test_harmonics_beyond_the_rows_are_refused_before_the_fit(viscous, monkeypatch):
     log = log_of(synthetic.synthetic_log(viscous, GAIT, cycles=12, samples=20))
     monkeypatch.setattr(smooth, "smoothed", lambda *_: pytest.fail("it was smoothed"))
-    with refused("at most 5.*got 9"):
+    with refused(in_order("harmonics 5 9")):
         measured.fit_log(log, harmonics=9)
 
 
@@ -731,22 +876,40 @@ IN_DEGREES = "t a1_deg a2_deg x y heading_deg"
     ("header", "column", "value", "said"),
     [
         ("t a1 a2 x y heading", 1, 6.24, ""),
-        ("t a1 a2 x y heading", 1, -6.34, "line 52: a1 reaches -6.3.* where joint angles are in rad: add degrees"),
-        (IN_DEGREES, 2, 1799.0, ""), (IN_DEGREES, 2, -1805.0, "line 52: a2_deg reaches -1805 degrees: no joint turns that far"),
-        ("t a1 a2 x y heading", 5, 331.0, "line 52: heading jumps by 331, a full turn in degrees: say degrees"),
-        ("t a1 a2 x y heading", 5, -389.0, "jumps by 38"), ("t a1 a2 x y heading", 5, 329.0, ""),
-        ("t a1 a2 x y heading", 5, 391.0, ""), (IN_DEGREES, 5, 360.0, ""),
+        (
+            "t a1 a2 x y heading",
+            1,
+            -6.34,
+            "line 52 a1 reaches -6.3 joint rad degrees",
+        ),
+        (IN_DEGREES, 2, 1799.0, ""),
+        (
+            IN_DEGREES,
+            2,
+            -1805.0,
+            "line 52 a2_deg reaches -1805 degrees joint turns",
+        ),
+        (
+            "t a1 a2 x y heading",
+            5,
+            331.0,
+            "line 52 heading jumps 331 full degrees degrees",
+        ),
+        ("t a1 a2 x y heading", 5, -389.0, "jumps 38"),
+        ("t a1 a2 x y heading", 5, 329.0, ""),
+        ("t a1 a2 x y heading", 5, 391.0, ""),
+        (IN_DEGREES, 5, 360.0, ""),
     ],
-)  # fmt: skip
+)
 @pytest.mark.filterwarnings("ignore:.*joint angles are at most")
 def test_degrees_are_told_from_radians(header, column, value, said, tmp_path):
     path = columns_of(tmp_path / "log.csv", header, 120, value, column)
-    with refused(said):
+    with refused(in_order(said)):
         measured.read(path)
 
 
 def test_radians_that_are_read_as_degrees_are_noted(tmp_path):
-    with pytest.warns(UnitWarning, match="log.csv: joint angles are at most 6.2"):
+    with pytest.warns(UnitWarning, match=in_order("log.csv 6.2")):
         measured.read(columns_of(tmp_path / "log.csv", IN_DEGREES, 120, -6.25, 2))
 
 
@@ -786,7 +949,7 @@ def test_an_angle_without_a_unit_is_in_radians_and_that_is_said(short, tmp_path)
     names = ("time", "joint1_deg", "joint2_deg", "x", "y", "theta")
     degrees = changed(slice(1, 3), lambda r: np.degrees(r[:, 1:3]))
     path = written(tmp_path / "c.csv", short, names, degrees)
-    with pytest.warns(Note, match="theta is assumed to be in rad"):
+    with pytest.warns(Note, match=in_order("theta rad")):
         log = measured.read(path)
     np.testing.assert_allclose(log.alpha, short.alpha)
 
@@ -827,7 +990,7 @@ def test_a_left_handed_pose_is_refused(moving):
         moving.pose[:, [1, 0, 2]],
         moving.pose * [1, 1, -1] + [0, 0, 2],
     ):
-        with refused("x, y and heading do not agree, .* give y pointing up"):
+        with refused(in_order("x y heading y up")):
             measured.fit_log(log_of(moving._replace(pose=wrong)), harmonics=2)
 
 
@@ -874,14 +1037,37 @@ def smooth_of(values, noise=0.0, knots=4.0):
 @pytest.mark.parametrize(
     ("speed", "turn", "period", "length", "facts", "said"),
     [
-        (0.98, 1.96, 299.0, 1.0, {}, ()), (1.02, 0.0, 1.0, 1.0, {}, ("x and y move by 2.04 body lengths while",)),
-        (0.5, 2.02, 1.0, 1.0, {}, ("the heading turns 4.04 times as fast as the joints",)),
-        (2.9, 0.0, 1.0, 3.0, {"metres": True}, ()), (0.5, 0.0, 301.0, 1.0, {"seconds": False}, ()),
-        (3.1, 0.0, 301.0, 3.0, {}, ("x and y move by 2.07", "the joints repeat every 301, and t is")),
-        (0.5, 0.0, 1.0, None, {"metres": True}, ("the column names give x and y in m",)),
+        (0.98, 1.96, 299.0, 1.0, {}, ()),
+        (1.02, 0.0, 1.0, 1.0, {}, ("x and y move by 2.04 body lengths while",)),
+        (
+            0.5,
+            2.02,
+            1.0,
+            1.0,
+            {},
+            ("the heading turns 4.04 times as fast as the joints",),
+        ),
+        (2.9, 0.0, 1.0, 3.0, {"metres": True}, ()),
+        (0.5, 0.0, 301.0, 1.0, {"seconds": False}, ()),
+        (
+            3.1,
+            0.0,
+            301.0,
+            3.0,
+            {},
+            ("x and y move by 2.07", "the joints repeat every 301, and t is"),
+        ),
+        (
+            0.5,
+            0.0,
+            1.0,
+            None,
+            {"metres": True},
+            ("the column names give x and y in m",),
+        ),
         (0.5, 0.0, 1.0, 1.0, {"metres": True}, ()),
     ],
-)  # fmt: skip
+)
 def test_units_are_noted_beyond_what_bodies_do(
     speed, turn, period, length, facts, said, recwarn
 ):

@@ -108,11 +108,15 @@ def test_slopes_of_a_cycle_are_those_of_differences_of_whole_gaits(joints, mediu
 @pytest.mark.parametrize(
     "objective",
     [
-        Objective("displacement", length=0.3), Objective("displacement", "x"), Objective("displacement", "y"),
-        Objective("turning"), Objective("efficiency", "x", 0.3), Objective("speed", rate=2.0),
+        Objective("displacement", length=0.3),
+        Objective("displacement", "x"),
+        Objective("displacement", "y"),
+        Objective("turning"),
+        Objective("efficiency", "x", 0.3),
+        Objective("speed", rate=2.0),
     ],
     ids=repr,
-)  # fmt: skip
+)
 def test_slopes_of_aims_are_those_of_differences(objective):
     system = Swimmer(FLUID, ODD)
     loops, p = some_loop()
@@ -261,8 +265,13 @@ def test_limits_hold_and_are_named(short):
 
 @pytest.mark.parametrize(
     ("amplitude", "centre", "inside"),
-    [(0.4, (0.8, 0.0), True), (0.4, (0.0, 0.0), True), (0.4, (0.8, 0.7), False), (0.4, (-0.2, 0.0), False)],
-)  # fmt: skip
+    [
+        (0.4, (0.8, 0.0), True),
+        (0.4, (0.0, 0.0), True),
+        (0.4, (0.8, 0.7), False),
+        (0.4, (-0.2, 0.0), False),
+    ],
+)
 def test_linear_limits_of_loops_are_their_box(amplitude, centre, inside):
     loops = Loops(2, 2, LOPSIDED)
     A, b = loops.limits()
@@ -333,8 +342,14 @@ def test_an_ascent_takes_the_steps_it_is_given(monkeypatch):
 
 @pytest.mark.parametrize(
     ("kind", "values", "feasible"),
-    [("ineq", [0.3, 0.0], 1), ("ineq", [0.3, -0.3], 0), ("eq", [0.0, 0.0], 1), ("eq", [0.0, 0.3], 0), ("eq", [-0.3, 0.0], 0)],
-)  # fmt: skip
+    [
+        ("ineq", [0.3, 0.0], 1),
+        ("ineq", [0.3, -0.3], 0),
+        ("eq", [0.0, 0.0], 1),
+        ("eq", [0.0, 0.3], 0),
+        ("eq", [-0.3, 0.0], 0),
+    ],
+)
 def test_a_constraint_is_met_from_one_side_or_from_both(kind, values, feasible):
     rule = {"type": kind, "fun": lambda x: np.array(values)}
     assert is_feasible(rule, np.zeros(2)) == feasible
@@ -461,12 +476,47 @@ def test_the_second_start_goes_along_the_limits_and_all_are_strokes_within_them(
         assert (low >= loops.box[0]).all() and (high <= loops.box[1]).all()
 
 
+def test_outlines_treat_both_joints_and_both_senses_of_each_alike():
+    """Mirror images of outlines are among them, and none is twice."""
+
+    def corners(outline, signs):
+        return frozenset(map(tuple, np.round(np.multiply(outline, signs), 9) + 0.0))
+
+    outlines = {corners(outline, (1, 1)) for outline in series.OUTLINES}
+    assert len(outlines) == len(series.OUTLINES)
+    for signs in ((-1, 1), (1, -1), (-1, -1)):
+        assert {corners(outline, signs) for outline in series.OUTLINES} == outlines
+    assert max(np.abs(outline).max() for outline in series.OUTLINES) == 1.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_least_sweep_of_an_interval_is_the_least_of_its_phases(seed):
+    loops, p = some_loop(seed, phases=48)
+    stroke = Stroke(loops, p)
+    found = stroke.swept(p)
+    # Area per phase, at 21 phases of each interval, and at its edges.
+    half = np.pi / loops.phases
+    shifts = np.linspace(-half, half, 21)
+    dense = []
+    for shift in shifts:
+        moved = series.shifted(p, shift)
+        alpha, alphadot = loops.cycle(moved)
+        (u, v), (du, dv) = ((x @ stroke.plane).T for x in (alpha - p[0], alphadot))
+        dense.append(stroke.side * (u * dv - v * du) / stroke.size)
+    least = np.min(dense, axis=0)
+    np.testing.assert_allclose(found, least, atol=2e-3 * np.ptp(dense))
+    assert (found <= least + 1e-6 * np.ptp(dense)).all()
+
+
 @pytest.mark.parametrize(
     ("text", "limits"),
     [
-        ("1.5", 1.5), ("90deg", np.pi / 2), ("-0.5:2", [(-0.5, 2.0)] * 2), ("1,-90deg:2", [(-1.0, 1.0), (-np.pi / 2, 2.0)]),
+        ("1.5", 1.5),
+        ("90deg", np.pi / 2),
+        ("-0.5:2", [(-0.5, 2.0)] * 2),
+        ("1,-90deg:2", [(-1.0, 1.0), (-np.pi / 2, 2.0)]),
     ],
-)  # fmt: skip
+)
 def test_limits_as_they_are_typed(text, limits):
     found = joint_limits(text, viscous())
     assert np.asarray(found) == pytest.approx(np.asarray(limits))
@@ -662,13 +712,15 @@ TURNED = Ellipse(semi_axes=(1.0, 0.6), tilt=0.4, centre=(0.3, -0.1))
     [
         (lambda p: series.shifted(p, 1.3), {}, True),
         (lambda p: series.reversed_loop(series.shifted(p, 4.0)), {}, True),
-        (lambda p: -p, {}, True), (lambda p: -p, {"mirror": False}, False),
-        (lambda p: p + 0.3 * (np.arange(9) == 3)[:, None], {}, False), (lambda p: 1.1 * p, {}, False),
+        (lambda p: -p, {}, True),
+        (lambda p: -p, {"mirror": False}, False),
+        (lambda p: p + 0.3 * (np.arange(9) == 3)[:, None], {}, False),
+        (lambda p: 1.1 * p, {}, False),
         (lambda p: -series.shifted(p, 4.0), {"odd": False}, True),
         (lambda p: series.reversed_loop(series.shifted(p, 4.0)), {"odd": False}, False),
         (lambda p: -series.reversed_loop(p), {"odd": False}, False),
     ],
-)  # fmt: skip
+)
 def test_loops_that_are_one(other, options, same):
     loops = Loops(2, 4, 2.5)
     p = loops.from_gait(TURNED)

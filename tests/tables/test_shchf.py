@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 from structs import cell, save
+from words import in_order
 
 import rft
 from geomech import scenes
@@ -142,41 +143,41 @@ ONE_JOINT = {"A1": [0.0, 1.0], "B1": [0.0, 1.0]}
 @pytest.mark.parametrize(
     ("variables", "settings", "said"),
     [
-        ({"x": 1.0}, {}, "has no gait: a gait is alpha1, alpha2"),
-        ({"A1": [0.0, 1.0], "B1": [0.0]}, {}, "has no gait"),
-        ({"A1": [0.1], "B1": [0.0]}, {}, "has no gait"),
-        ({"A1": [0.1, 1], "A2": [0.1, 1], "B1": [0.0, 5]}, {}, "has no gait"),
-        ({"A2": [0.1, 1], "B2": [0.0, 5]}, {}, "has no gait"),
-        (ONE_JOINT, {"number": 2}, "has one gait, but no number 2: remove number"),
+        ({"x": 1.0}, {}, "no gait alpha1 alpha2"),
+        ({"A1": [0.0, 1.0], "B1": [0.0]}, {}, "no gait"),
+        ({"A1": [0.1], "B1": [0.0]}, {}, "no gait"),
+        ({"A1": [0.1, 1], "A2": [0.1, 1], "B1": [0.0, 5]}, {}, "no gait"),
+        ({"A2": [0.1, 1], "B2": [0.0, 5]}, {}, "no gait"),
+        (ONE_JOINT, {"number": 2}, "gait number 2 number"),
         (
             {"p": {"phi_def": 1.0}},
             {},
-            "has no gait: .* function handles cannot be read",
+            "no gait function handles",
         ),
-        (NO_PATH, {}, r"p.phi_locus_full\{1\} without shapes"),
-        (NO_PATH, {"number": 2}, "has 1 gaits, but no number 2: use number = 1 to 1"),
-        (NO_PATH, {"number": 0}, "has 1 gaits, but no number 0: use number = 1 to 1"),
-        (ONE_JOINT, {"sha256": "0"}, "does not match sha256"),
+        (NO_PATH, {}, "p.phi_locus_full{1} shapes"),
+        (NO_PATH, {"number": 2}, "1 gaits number 2 number = 1 1"),
+        (NO_PATH, {"number": 0}, "1 gaits number 0 number = 1 1"),
+        (ONE_JOINT, {"sha256": "0"}, "sha256"),
     ],
 )
 def test_files_without_a_gait_are_refused(variables, settings, said, tmp_path):
     savemat(tmp_path / "a.mat", variables)
-    with pytest.raises(Refusal, match=said):
+    with pytest.raises(Refusal, match=in_order(said)):
         Shchf(file=tmp_path / "a.mat", **settings)
 
 
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
-        ({}, "either XV or a file: give one"),
-        ({"XV": (1.0, 1.0), "file": "a.mat"}, "either XV or a file: give one"),
-        ({"XV": (1.0, 1.0, 0.1)}, "XV must be pairs a1, b1, a3, b3"),
-        ({"file": "none.mat"}, "cannot read the gait none.mat: No such file"),
-        ({"file": 3}, "file must be the name of a .mat file, got 3"),
+        ({}, "XV file"),
+        ({"XV": (1.0, 1.0), "file": "a.mat"}, "XV file"),
+        ({"XV": (1.0, 1.0, 0.1)}, "XV a1 b1 a3 b3"),
+        ({"file": "none.mat"}, "gait none.mat file"),
+        ({"file": 3}, "file file 3"),
     ],
 )
 def test_settings_that_make_no_gait_are_refused(settings, said):
-    with pytest.raises(Refusal, match=said):
+    with pytest.raises(Refusal, match=in_order(said)):
         Shchf(**settings)
 
 
@@ -186,27 +187,27 @@ SQUARE = {"alpha1": [0, 1, 1, 0], "alpha2": [0, 0, 1, 0], "t": [1, 2, 3, 4]}
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"alpha1": 31.42 * np.sin(T)}, "up to 31.42 where angles are in rad: convert"),
+        ({"alpha1": 31.42 * np.sin(T)}, "up 31.42 rad"),
         (
             {"alpha2": np.sin(T) + 2.1e-3 * T / T[-1]},
-            "do not form a closed curve: .* is 0.0021 rad",
+            "closed 0.0021 rad",
         ),
         (
             {"alpha1": [0, 1, 0], "alpha2": [0, 0, 0], "t": [1, 2, 3]},
-            "not four or more shapes",
+            "four shapes",
         ),
-        ({"t": [*T[:100], *T[99:-1]]}, "not four or more shapes at increasing times"),
-        ({"t": T[:9]}, "not four or more shapes at increasing times"),
-        ({"alpha2": np.sin(T[:-1])}, "not four or more shapes"),
+        ({"t": [*T[:100], *T[99:-1]]}, "four shapes times"),
+        ({"t": T[:9]}, "four shapes times"),
+        ({"alpha2": np.sin(T[:-1])}, "four shapes"),
         (
             {"alpha2": np.nan * T},
-            r"has alpha2 that is not finite .* \(0, 0\): correct the file",
+            "alpha2 finite 0 0 file",
         ),
-        ({"alpha1": "words"}, "has alpha1 that is not an array of real numbers"),
+        ({"alpha1": "words"}, "alpha1 real"),
     ],
 )
 def test_points_that_make_no_gait_are_refused(changes, said, tmp_path):
-    with pytest.raises(Refusal, match=said):
+    with pytest.raises(Refusal, match=in_order(said)):
         Shchf(file=points(tmp_path / "a.mat", **changes))
 
 

@@ -3,12 +3,14 @@
 import contextlib
 import functools
 import operator
+import re
 import sys
 
 import numpy as np
 import pytest
 from scipy.io import loadmat
 from structs import cell, computed, save, struct
+from words import in_order
 
 import rft
 from geomech.io import tables
@@ -260,97 +262,96 @@ def spoilt(value):
         (
             ("vecfield",),
             None,
-            "has no s.vecfield.eval.content.Avec: save it with sys_calc",
+            "s.vecfield.eval.content.Avec sys_calc",
         ),
-        (("grid", "eval"), None, "has no s.grid.eval: save it with"),
+        (("grid", "eval"), None, "s.grid.eval"),
         (
             ("grid", "eval"),
             np.ones((5, 4)),
-            "has s.grid.eval that is not a cell of gr",
+            "s.grid.eval cell",
         ),
-        (("grid", "eval"), lambda x: x[:1], "has s.grid.eval that is not a cell"),
+        (("grid", "eval"), lambda x: x[:1], "s.grid.eval cell"),
         (
             ("grid", "eval"),
             lambda x: -x,
-            "has no grid: s.grid.eval{1} must be at least 4 ascending angles",
+            "grid s.grid.eval{1} 4 ascending",
         ),
         (
             ("grid", "eval"),
             lambda x: 57.3 * x,
-            "has s.grid.eval{1} up to 57.3 where angles are in rad",
+            "s.grid.eval{1} up 57.3 rad",
         ),
         (
             ("grid", "eval"),
             lambda x: cell(np.array([y.T for y in x.ravel()]), (2,)),
-            "has s.grid.eval{1} that varies along other dimensions than dimension 1: only",
+            "s.grid.eval{1} dimensions 1",
         ),
         (
             ("grid", "eval", (0, 0)),
             lambda x: x + 2e-9 * np.eye(5, 4),
-            "has s.grid.eval{1} that varies along other dimensions than dimension 1",
+            "s.grid.eval{1} dimensions 1",
         ),
         (
             ("grid", "eval", (0, 0)),
             spoilt(np.nan),
-            "has s.grid.eval{1} that is not finite (nan or inf) at (3, 4): correct the file",
+            "s.grid.eval{1} finite 3 4 file",
         ),
         (
             ("grid", "eval", (1, 0)),
             np.ones((4, 5)),
-            "has s.grid.eval of different shapes, (5, 4),",
+            "s.grid.eval different shapes 5 4",
         ),
         (
             (*CONTENT, "Avec"),
             lambda x: x[:2],
-            "has s.vecfield.eval.content.Avec that is not a cell of 3 x 2 arrays: save it",
+            "s.vecfield.eval.content.Avec cell 3 x 2",
         ),
         (
             (*CONTENT, "Avec", (2, 1)),
             np.ones((4, 5)),
-            "has s.vecfield.eval.content.Avec{3, 2} of shape (4, 5) where its grid req",
+            "s.vecfield.eval.content.Avec{3 2} shape 4 5 grid",
         ),
         (
             (*CONTENT, "Avec", (1, 0)),
             spoilt(np.nan),
-            "has s.vecfield.eval.content.Avec{2, 1} that is not finite (nan or inf) at",
+            "s.vecfield.eval.content.Avec{2 1} finite",
         ),
         (
             (*CONTENT, "A_num"),
             cell(-NEGATIVE, (3, 2)),
-            "is damaged: s.vecfield.eval.content.Avec{1, 1} is not the negative of A_n",
+            "damaged s.vecfield.eval.content.Avec{1 1} negative A_n",
         ),
         (
             (*CONTENT, "A_num"),
             cell(NEGATIVE * (1 + 1e-8), (3, 2)),
-            "is damaged: s.vecf",
+            "damaged s.vecf",
         ),
         (
             ("DA",),
             lambda x: x[:2],
-            "has s.DA that is not a cell of 3 x 1 arrays: save it",
+            "s.DA cell 3 x 1",
         ),
         (
             (*METRIC, (0, 1)),
             lambda x: x + 1e-7,
-            "has s.metricfield.metric_eval.content.metric that is not symmetric: {1, 2",
+            "s.metricfield.metric_eval.content.metric symmetric {1 2",
         ),
         (
             ("grid", "metric_eval", (0, 0)),
             lambda x: x + 0.2 + 4e-9,
-            "has s.grid.metric_eval that does not cover s.grid.eval",
+            "s.grid.metric_eval cover s.grid.eval",
         ),
         (
             ("grid", "metric_eval", (1, 0)),
             lambda x: x - 0.05 - 4e-9,
-            "has s.grid.metric_eval that does not cover",
+            "s.grid.metric_eval cover",
         ),
     ],
 )
 def test_a_bad_struct_is_refused_by_place_and_cure(place, value, said, tmp_path):
     path = uneven(tmp_path / "s.mat", (place, value))
-    with pytest.raises(Refusal) as refusal:
+    with pytest.raises(Refusal, match=f"{re.escape(str(path))}.*{in_order(said)}"):
         tables.load(path)
-    assert str(refusal.value).startswith(f"the table {path} {said}")
 
 
 @pytest.mark.parametrize(
@@ -400,10 +401,10 @@ def test_damaged_files_of_version_7_3_are_refused_or_read_as_finite(tmp_path):
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
-        (lambda s: s.__setitem__("again", s), "is damaged at s.again.again"),
+        (lambda s: s.__setitem__("again", s), "damaged s.again.again"),
         (
             lambda s: s.__setitem__("far", h5py().SoftLink("/s/x")),
-            "has s.far in another",
+            "s.far another",
         ),
     ],
 )
@@ -411,7 +412,7 @@ def test_links_in_files_of_version_7_3_are_refused(spoil, said, tmp_path):
     path = write(tmp_path / "s.mat", 7.3)
     with h5py().File(path, "a") as file:
         spoil(file["s"])
-    with pytest.raises(Refusal, match=said):
+    with pytest.raises(Refusal, match=in_order(said)):
         tables.load(path)
 
 

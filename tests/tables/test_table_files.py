@@ -1,12 +1,14 @@
 """What files of tables hold, part by part, and what is wrong with bad ones."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray
 from scipy.io import savemat
+from words import in_order
 
 from geomech.io import tables
 from rft.core.refusal import Refusal
@@ -17,9 +19,9 @@ ENTRIES = ("Ax1", "Ax2", "Ay1", "Ay2", "Atheta1", "Atheta2")
 
 
 def assert_refused(path, said, **options):
-    with pytest.raises(Refusal) as refusal:
+    """Assert that a table is refused by its name and these words, in their order."""
+    with pytest.raises(Refusal, match=f"{re.escape(str(path))}.*{in_order(said)}"):
         tables.load(path, **options)
-    assert str(refusal.value).startswith(f"the table {path} {said}")
 
 
 # NetCDF.
@@ -156,22 +158,22 @@ def test_parts_that_a_netcdf_file_lacks_are_none(tmp_path):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (less("joint"), "holds no connection, joint is missing: write it again"),
-        (less("fit_residual"), "holds no connection, fit_residual is missing"),
+        (less("joint"), "joint missing"),
+        (less("fit_residual"), "fit_residual missing"),
         (
             part("joint", ("joint", "k"), np.zeros((2, 1))),
-            "has A over the dimensions (component, jo",
+            "A dimensions component",
         ),
-        (part("joint", ("k",), np.arange(3)), "holds no connection, alpha_3 is miss"),
+        (part("joint", ("k",), np.arange(3)), "alpha_3 missing"),
         (
             part("alpha_2", ("alpha_2",), AXES[1], units="rads"),
-            "has alpha_2 in the unit 'rads'",
+            "alpha_2 unit rads",
         ),
-        (part("alpha_1", ("alpha_1",), 20 * AXES[0][::-1]), "has no grid: alpha_1 mu"),
-        (part("alpha_1", ("alpha_1",), 57 * AXES[0]), "has alpha_1 up to 57 where an"),
+        (part("alpha_1", ("alpha_1",), 20 * AXES[0][::-1]), "grid alpha_1"),
+        (part("alpha_1", ("alpha_1",), 57 * AXES[0]), "alpha_1 up 57"),
         (
             both(less("A_error"), cut("A", np.s_[:, :1], ("component", "one", *GRID))),
-            "has A over the dimensions (component, one, alpha_1, alpha_2); they must be",
+            "A dimensions component one alpha_1 alpha_2",
         ),
         (
             both(
@@ -179,51 +181,51 @@ def test_parts_that_a_netcdf_file_lacks_are_none(tmp_path):
                 less("A_error"),
                 cut("A", np.s_[:, :1]),
             ),
-            "has A of shape (3, 1, 5, 4); it must be (3, 2, ...), with the rows x, y, t",
+            "A shape 3 1 5 4 3 2 rows x y t",
         ),
         (
             part("component", ("component",), ["theta", "y", "x"]),
-            "has A of shape (3, 2",
+            "A shape 3 2",
         ),
         (
             part("A", ("component", "joint", *GRID), np.ones((3, 2, 5, 4), "i4")),
-            "has A of shape (3, 2, 5, 4) that does not fit its grid",
+            "A shape 3 2 5 4 grid",
         ),
-        (put("A", (0, 1, 2, 3), np.inf), "has A that is not finite (nan or inf) at in"),
-        (put("A", (0, 1, 2, 3), 2e9), "has A above 1e+09 at index (0, 1, 2, 3)"),
-        (attributes(length_unit="feet"), "has a body_length or length_unit that is"),
-        (attributes(body_length=1e9), "has a body_length"),
-        (attributes(body_length=0), "has a body_length"),
-        (attributes(body_length=[0.3, 0.3]), "has a body_length"),
-        (attributes(body_length="1"), "has a body_length"),
-        (attributes(interpolation=4), "has too few shapes for a spline of degree 4: w"),
-        (cut("harmonics", np.s_[:, :3]), "has harmonics of shape (3, 3, 5, 4); i"),
-        (put("harmonics", (1, 2, 3, 0), np.nan), "has harmonics that is not finite"),
-        (put("even_part", (1, 2, 3), np.nan), "has even_part that is not finite"),
+        (put("A", (0, 1, 2, 3), np.inf), "A finite"),
+        (put("A", (0, 1, 2, 3), 2e9), "A above 1e+09 0 1 2 3"),
+        (attributes(length_unit="feet"), "body_length length_unit"),
+        (attributes(body_length=1e9), "body_length"),
+        (attributes(body_length=0), "body_length"),
+        (attributes(body_length=[0.3, 0.3]), "body_length"),
+        (attributes(body_length="1"), "body_length"),
+        (attributes(interpolation=4), "few shapes spline degree 4"),
+        (cut("harmonics", np.s_[:, :3]), "harmonics shape 3 3 5 4"),
+        (put("harmonics", (1, 2, 3, 0), np.nan), "harmonics finite"),
+        (put("even_part", (1, 2, 3), np.nan), "even_part finite"),
         (
             cut("even_part", np.s_[:2], ("two", *GRID)),
-            "has even_part over the dimensions (two, alpha_1, alpha_2); they must be (component, a",
+            "even_part dimensions two alpha_1 alpha_2",
         ),
         (
             cut("A_error", np.s_[:, :1], ("component", "one", *GRID)),
-            "has A_error over the dimensions (component, one,",
+            "A_error dimensions component one",
         ),
-        (put("A_error", (0, 1, 2, 3), -1e-9), "has A_error below 0 where it is half o"),
+        (put("A_error", (0, 1, 2, 3), -1e-9), "A_error below 0"),
         (
             cut("pair_joints", np.s_[:, ::-1]),
-            "has pair_joints that differ from [[1, 2]]: wr",
+            "pair_joints [[1 2]]",
         ),
         (
             both(less("pair_joints"), cut("ccf_pairs", np.s_[[0, 0]])),
-            "has ccf_pairs of shape (2, 3, 5, 4); it must be (1, 3, ...)",
+            "ccf_pairs shape 2 3 5 4 1 3",
         ),
-        (put("ccf_pairs", (0, 2, 1, 1), np.nan), "has ccf_pairs that is not finite"),
-        (attributes(power_degree=100.0), "has a power_degree that is not valid"),
-        (attributes(power_degree=0), "has a power_degree"),
-        (attributes(power_degree=[1.0, 2.0]), "has a power_degree"),
+        (put("ccf_pairs", (0, 2, 1, 1), np.nan), "ccf_pairs finite"),
+        (attributes(power_degree=100.0), "power_degree valid"),
+        (attributes(power_degree=0), "power_degree"),
+        (attributes(power_degree=[1.0, 2.0]), "power_degree"),
         (
             cut("norm", np.s_[:4]),
-            "has a norm of shape (4, 5, 4); it must be (an odd number, ...) of",
+            "norm shape 4 5 4",
         ),
         (
             part(
@@ -231,16 +233,16 @@ def test_parts_that_a_netcdf_file_lacks_are_none(tmp_path):
                 ("joint", "other_joint", *GRID),
                 np.reshape([[1, 0.5], [0.6, 1]], (2, 2, 1, 1)) * np.ones((5, 4)),
             ),
-            "has a metric of shape (2, 2, 5, 4); it must be (2, 2, ...) and symm",
+            "metric shape 2 2 5 4 2 2 symmetric",
         ),
         (
             masked("A", "fit_residual", "speed", "A_error"),
-            "has A that is not finite (nan or inf) at index (0, 0, 1, 2)",
+            "A finite 0 0 1 2",
         ),
-        (masked("A", "A_error", **SINGULAR), "has fit_residual at singular shapes, wh"),
-        (masked("A", "fit_residual", **SINGULAR), "has A_error at singular shapes"),
-        (masked("fit_residual", **SINGULAR), "has fit_residual that is not finite"),
-        (masked("A_error", **SINGULAR), "has A_error that is not finite"),
+        (masked("A", "A_error", **SINGULAR), "fit_residual singular shapes"),
+        (masked("A", "fit_residual", **SINGULAR), "A_error singular shapes"),
+        (masked("fit_residual", **SINGULAR), "fit_residual finite"),
+        (masked("A_error", **SINGULAR), "A_error finite"),
     ],
 )
 def test_parts_of_a_netcdf_file_that_do_not_fit_are_refused(change, said, tmp_path):
@@ -318,7 +320,7 @@ def test_parts_of_a_gait_are_where_they_belong(sign, turn, tmp_path):
     assert (found.level, found.factor) == (0.9, 2.1)
 
 
-UNFIT = "has a gait whose parts do not match: write it again with 'geomech fit-g"
+UNFIT = "gait parts geomech fit-gait"
 EVEN = {
     "gait_A": np.ones((3, 2, 4)),
     "gait_slope": np.ones((3, 2, 1, 4)),
@@ -332,15 +334,15 @@ EVEN = {
         (
             {"gait_A": np.ones((3, 2))},
             {},
-            "has a gait, but no gait_A that matches it: wri",
+            "gait gait_A",
         ),
-        ({"gait_spread": None}, {}, "has a gait, but no gait_spread"),
+        ({"gait_spread": None}, {}, "gait gait_spread"),
         (
             {"gait": np.ones((2, 1))},
             {},
-            "has a gait that does not move: write it again",
+            "gait move",
         ),
-        ({"gait": np.zeros((2, 3))}, {}, "has a gait that does not move"),
+        ({"gait": np.zeros((2, 3))}, {}, "gait move"),
         ({"gait": np.ones((2, 4))}, {}, UNFIT),
         ({"gait_A": np.ones((2, 2, 5))}, {}, UNFIT),
         ({"gait_A": np.ones((3, 3, 5))}, {}, UNFIT),
@@ -437,69 +439,69 @@ def test_what_a_matlab_file_does_not_state_is_the_usual(tmp_path):
     [
         (
             ROWS,
-            "has alpha1 and alpha2 as rows, which do not determine the order of the arrays: add order =",
+            "alpha1 alpha2 rows order order =",
         ),
         (
             {"Ay2": PLAIN[:, :3]},
-            "has Ay2 of shape (5, 3) where alpha1 and alpha2 req",
+            "Ay2 shape 5 3 alpha1 alpha2",
         ),
-        ({"Ax1": np.full((5, 4), np.nan)}, "has Ax1 that is not finite"),
-        ({"Ax1": np.full((5, 4), 1j)}, "has Ax1 that is not an array of real numbers"),
-        ({"Ax1": "text"}, "has Ax1 that is not an array of real numbers"),
-        ({"Ax1": {"a": 1}}, "has Ax1 that is not an array of real numbers"),
-        (dict.fromkeys(ENTRIES, 0 * PLAIN), "has a connection that is zero everywhere"),
+        ({"Ax1": np.full((5, 4), np.nan)}, "Ax1 finite"),
+        ({"Ax1": np.full((5, 4), 1j)}, "Ax1 real"),
+        ({"Ax1": "text"}, "Ax1 real"),
+        ({"Ax1": {"a": 1}}, "Ax1 real"),
+        (dict.fromkeys(ENTRIES, 0 * PLAIN), "connection zero"),
         (
             {"alpha1": PLAIN[:, :3]},
-            "has alpha1 (5, 3) and alpha2 (5, 4), which do not form a",
+            "alpha1 5 3 alpha2 5 4",
         ),
         (
             {"alpha1": np.ones((3, 3, 3))},
-            "has alpha1 (3, 3, 3) and alpha2 (5, 4), whic",
+            "alpha1 3 3 3 alpha2 5 4",
         ),
         (
             {"alpha1": np.ones((5, 4))},
-            "has no grid: alpha1 must be at least 4 ascending",
+            "grid alpha1 4 ascending",
         ),
         (
             {"alpha1": PLAIN},
-            "has alpha1 and alpha2 that do not form a grid: one must change ",
+            "alpha1 alpha2 grid",
         ),
         (
             {"alpha1": AXES[0][:, None] + 2e-9 * np.arange(4)},
-            "has alpha1 and alpha2 that do not form a grid",
+            "alpha1 alpha2 grid",
         ),
         (
             {"alpha1": 6.4 * AXES[0][:, None] + 0 * PLAIN},
-            "has alpha1 up to 6.4 where angles are in rad: convert them to rad if these are deg",
+            "alpha1 up 6.4 rad rad",
         ),
         (
             {"M11": 0.25 / (1 + PLAIN)},
-            "has M11, M12 and M22 that do not form a metric at index",
+            "M11 M12 M22 metric",
         ),
         (
             {"M11": -1 - PLAIN, "M22": -1 - PLAIN},
-            "has M11, M12 and M22 that do not form a met",
+            "M11 M12 M22 metric",
         ),
         (
             {"M22": 0 * PLAIN},
-            "has M11, M12 and M22 that do not form a metric at index (0, 0): ",
+            "M11 M12 M22 metric 0 0",
         ),
         (
             {"M12": PLAIN[:4]},
-            "has M12 of shape (4, 4) where alpha1 and alpha2 require ",
+            "M12 shape 4 4 alpha1 alpha2",
         ),
         (
             {"geomech_A_error": np.ones((3, 2, 4, 5))},
-            "has geomech_A_error of shape (3, 2, 4, 5) where A has (3, 2, 5, 4)",
+            "geomech_A_error shape 3 2 4 5 A 3 2 5 4",
         ),
-        ({"geomech_A_error": -np.ones((3, 2, 5, 4))}, "has geomech_A_error below 0"),
+        ({"geomech_A_error": -np.ones((3, 2, 5, 4))}, "geomech_A_error below 0"),
         (
             {"geomech_A_error": np.full((3, 2, 5, 4), np.nan)},
-            "has geomech_A_error that ",
+            "geomech_A_error finite",
         ),
         (
             {"geomech_fit_residual": np.full((3, 5, 4), np.inf)},
-            "has geomech_fit_residual that is not finite",
+            "geomech_fit_residual finite",
         ),
     ],
 )
@@ -510,7 +512,7 @@ def test_parts_of_a_matlab_file_that_do_not_fit_are_refused(changes, said, tmp_p
 
 def test_a_connection_without_x_does_not_tell_its_sign(tmp_path):
     matlab(tmp_path / "a.mat", {"Ax1": 0 * PLAIN, "Ax2": 0 * PLAIN})
-    assert_refused(tmp_path / "a.mat", "does not state the sign of A: add sign = '+'")
+    assert_refused(tmp_path / "a.mat", "sign A sign")
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from frozen import FOLDER
 from registry import GROUND_EFFECTS, OUTLINES
+from words import in_order
 
 from geomech import medium, scenes
 from geomech.scenes import MeshScene
@@ -197,14 +198,14 @@ def test_what_is_written_reads_the_same(scene):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "header must be t,x,z, and angle if needed"),
-        ("t,x,y\n0,0,0\n", "line 1: the header must be t,x,z"),
-        ("t,x,z,z\n0,0,0,0\n", "line 1: the header has 2 columns z"),
-        ("t,x,z\n0,0,0\n1,1\n2,2,0\n", "line 3: a row must be 3 finite numbers"),
-        ("t,x,z\n0,0,0\n1,nan,0\n", "line 3: a row must be 3 finite numbers"),
-        ("t,x,z\n0,0,0\n1,1,0\n", "a path must have 3 to 100000 poses, got 2"),
-        ("t,x,z\n0,0,0\n1,1,0\n1,2,0\n", "t must increase"),
-        ("t,x,z\n0,0,0\n1,5000,0\n2,2,0\n", "x must be finite and within 1000 m"),
+        ("", "header t,x,z"),
+        ("t,x,y\n0,0,0\n", "line 1 t,x,z"),
+        ("t,x,z,z\n0,0,0,0\n", "line 1 header 2 columns z"),
+        ("t,x,z\n0,0,0\n1,1\n2,2,0\n", "line 3 row 3 finite"),
+        ("t,x,z\n0,0,0\n1,nan,0\n", "line 3 row 3 finite"),
+        ("t,x,z\n0,0,0\n1,1,0\n", "3 100000 2"),
+        ("t,x,z\n0,0,0\n1,1,0\n1,2,0\n", "t increase"),
+        ("t,x,z\n0,0,0\n1,5000,0\n2,2,0\n", "x finite 1000 m"),
     ],
 )
 def test_bad_paths_are_refused_with_their_line(text, said, tmp_path):
@@ -212,7 +213,7 @@ def test_bad_paths_are_refused_with_their_line(text, said, tmp_path):
     before, _, _ = MADE.partition("[motion]")
     file = tmp_path / "s.toml"
     file.write_text(f'{before}[motion]\nkind = "csv"\nfile = "path.csv"\n')
-    with pytest.raises(Refusal, match=said):
+    with pytest.raises(Refusal, match=in_order(said)):
         scenes.load(file)
 
 

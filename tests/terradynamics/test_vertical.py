@@ -134,6 +134,21 @@ def test_a_survey_finds_what_drives_a_motion_on():
     assert found.pulling == pytest.approx(pulled.mean(), abs=1e-12)
 
 
+def test_a_survey_says_where_most_is_driven():
+    found = survey(StressMap(zeta=0.3), cells=90)
+    power = np.full((90, 180), -1.0)
+    power[60, 10] = 0.5
+    power[20, 110:119] = 0.25
+    described = dataclasses.replace(found, power=power).description()
+    beta = np.degrees(found.beta[60])
+    gamma = np.degrees(found.gamma[10])
+    assert f"beta = {beta:.0f}, gamma = {gamma:.0f} " in described
+    assert f"{100 * 10 / power.size:.1f} %" in described
+    assert f"{100 * found.pulling:.1f} %" in described
+    still = dataclasses.replace(found, power=0 * power, normal=0 * power)
+    assert "%" not in still.description()
+
+
 @pytest.mark.parametrize("grazing", [0.0, M0.grazing])
 @pytest.mark.parametrize(
     ("rod", "tension", "expected"),

@@ -38,6 +38,7 @@ import numpy as np
 from words import (
     TOLERANCE,
     WORD,
+    bare,
     flat,
     line_holds,
     masked,
@@ -54,7 +55,7 @@ COMMANDS = DATA / "commands.txt"
 REFUSALS = DATA / "refusals.txt"
 KEYS = DATA / "keys.txt"
 
-
+# Modules whose names programs use.
 DOORS = [
     "rft",
     "geomech",
@@ -64,8 +65,6 @@ DOORS = [
     "geomech.mathematics.systems",
     "rft.bodies",
     "rft.effects",
-]
-DOORS += [
     "rft.grains",
     "rft.terradynamics.ground",
     "rft.laws",
@@ -108,8 +107,8 @@ def files() -> dict[pathlib.Path, int]:
 
 # commands.txt
 
-
-HELP = r"^  (-\S.*?|[\[{A-Z]\S*|[a-z][a-z-]*)(?: <|  |$)"  # its options and commands
+# Options and commands in a help text.
+HELP = r"^  (-\S.*?|[\[{A-Z]\S*|[a-z][a-z-]*)(?: <|  |$)"
 
 
 def ran(line: str) -> list[str]:
@@ -174,30 +173,25 @@ def differs(old: list[str], new: list[str]) -> str:
 # under [geomech] whole commands, under [python] expressions; each with how it ends,
 # what its message names, and "cure" where that says what to do.
 
-CURE = re.compile(  # words of a cure, or of what a value must be
-    r"\?$|did you mean|\b(must|such as|possible|takes?|use|give|say|add|put|write|raise|lower|widen|leave|drop|keep|choose"
-    r"|name|close|check|install|wait|start|turn|split|end|see|mend|clean|shrink|convert|restore|rename|copy|needs?|belongs"
-    r"|from|only|at least|at most|one of|in place of|it has|too few|order|below|above|beyond|within"
-    r"|remove|correct|reduce|call|list|optimize|the \w+ are)\b",
-    re.I,
-)
+CURES = """did you mean|must|such as|possible|takes?|use|give|say|add|put|write|raise
+|lower|widen|leave|drop|keep|choose|name|close|check|install|wait|start|turn|split|end
+|see|mend|clean|shrink|convert|restore|rename|copy|needs?|belongs|from|only|at least
+|at most|one of|in place of|it has|too few|order|below|above|beyond|within|remove
+|correct|reduce|call|list|optimize|the \\w+ are"""
+# Words of a cure, or of what a value must be.
+CURE = re.compile(rf"\?$|\b({CURES.replace(chr(10), '')})\b", re.I)
 ORDINARY = {  # words of a sentence as much as of a scene
-    "body", "gait", "medium", "motion", "robot", "system", "file", "a", "of", "the", "to", "in", "on", "and", "no", "from", "x",
-    "kind", "law", "name", "effects", "numerics", "array", "format", "text", "not", "one", "is", "type", "with", "header", "be",
-}  # fmt: skip
-TYPES = {
-    "array",
-    "float",
-    "int",
-    "str",
-    "bool",
-    "object",
-    "null",
-    "float | null",
-    "s",
-    "m",
-}  # words for what a key takes
-ESCAPES = {"n": b"\n", "r": b"\r", "t": b"\t", "0": b"\0", "\\": b"\\"}
+    *("body", "gait", "medium", "motion", "robot", "system", "file", "kind", "law"),
+    *("name", "effects", "numerics", "array", "format", "text", "type", "header", "x"),
+    *("a", "of", "the", "to", "in", "on", "and", "no", "not", "from", "one", "is"),
+    *("with", "be"),
+}
+TYPES = {  # words for what a key takes
+    *("array", "float", "int", "str", "bool", "object", "null", "float | null"),
+    *("s", "m"),
+}
+MOST_NAMES = 14  # of a refusal that are recorded
+ESCAPES = {"n": "\n", "r": "\r", "t": "\t", "0": "\0", "\\": "\\"}
 
 
 def namespace() -> dict:
@@ -207,23 +201,29 @@ def namespace() -> dict:
 
     found: dict = {"np": np, "math": math, "rft": rft, "geomech": top}
     for module in (rft, top.systems, top.gaits, top.bodies, top.media, top.effects):
-        found |= {name: x for name, x in vars(module).items() if isinstance(x, type)}
-    found |= {name: getattr(top, name) for name in public_names(top)}
-    modules = ("connection", "curvature", "reconstruct")
-    return found | {name: getattr(top.geometry, name) for name in modules}
+        for name, x in vars(module).items():
+            if isinstance(x, type):
+                found[name] = x
+    for name in public_names(top):
+        found[name] = getattr(top, name)
+    for name in ("connection", "curvature", "reconstruct"):
+        found[name] = getattr(top.geometry, name)
+    return found
 
 
 def raw(text: str) -> bytes:
-    """A side of an edit as bytes: \\n, \\r, \\t, \\0, \\\\ and \\xNN are escapes."""
-    pieces = re.split(r"\\(x[0-9a-f]{2}|.)", text)
-    return b"".join(
-        piece.encode()
-        if not k % 2
-        else bytes.fromhex(piece[1:])
-        if len(piece) == 3
-        else ESCAPES[piece]
-        for k, piece in enumerate(pieces)
-    )
+    """Return a side of an edit as bytes: \\n, \\r, \\t, \\0, \\\\ and \\xNN are
+    escapes."""
+
+    def character(found: re.Match) -> str:
+        escape = found[1]
+        if len(escape) == 3:  # of a byte, which latin-1 gives back below
+            return chr(int(escape[1:], 16))
+        return ESCAPES[escape]
+
+    # Letters beyond one byte are bytes of UTF-8 first.
+    latin = text.encode().decode("latin-1")
+    return re.sub(r"\\(x[0-9a-f]{2}|.)", character, latin).encode("latin-1")
 
 
 def public_names(module) -> list[str]:
@@ -235,7 +235,9 @@ def edited(content: bytes, edits: str) -> bytes:
     => new" replaces all of it, " => new" is added at its end, and " && " goes between
     several."""
     for edit in edits.split(" && "):
-        old, new = (raw(side.strip(" ")) for side in edit.split("=>", 1))
+        before, after = edit.split("=>", 1)
+        old = raw(before.strip(" "))
+        new = raw(after.strip(" "))
         assert old == b"*" or old in content, f"{old!r} is not there to be changed"
         if old == b"*":
             content = new
@@ -253,8 +255,9 @@ def refused(section: str, case: str) -> tuple[str, str]:
     if section == "python":
         return raised(case)
     command, _, name = section.partition(" | ")
-    named = (word for word in command.split() if (FOLDER / word).is_file())
-    file = pathlib.Path(name or next(named))
+    if not name:  # the first file that the command names
+        name = next(word for word in command.split() if (FOLDER / word).is_file())
+    file = pathlib.Path(name)
     before = file.read_bytes()
     try:
         file.write_bytes(edited(before, case))
@@ -287,45 +290,55 @@ def ended(line: str) -> tuple[str, str]:
         "says too much": len(err) > 600,
         "writes": files() != before,
     }
-    end = " and ".join([code, *(what for what, found in amiss.items() if found)])
-    return end, " ".join(x for x in lines if x.startswith("error: "))
+    ends = [code]
+    for what, found in amiss.items():
+        if found:
+            ends.append(what)
+    message = " ".join(line for line in lines if line.startswith("error: "))
+    return " and ".join(ends), message
 
 
 def named(message: str, given: str) -> list[str]:
-    """What a refusal calls by name, in its order: what `names` finds, [sections],
-    numbers, words and keys that were given."""
+    """Return what a refusal calls by name, in its order: what `names` finds,
+    [sections], numbers, words and keys that were given."""
     given = given.replace("\\n", " ")
-    words = {
-        *re.findall(r"[A-Za-z][\w-]+", given),
-        *re.findall(r"(\w+) =", given),
-    } - ORDINARY
-    words &= set(re.findall(r"[A-Za-z](?:[\w-]*\w)?", message))
-    found = {word.strip("./") for word in names(message) | words} | set(
-        re.findall(r"\[+[a-z.]+\]+", message)
-    )
-    found = {
-        word
-        for word in found
-        if 0 < len(word) <= 60
-        and not re.search("#|_plugin_", word)
-        and (word[1:] or word in words)
-    } - TYPES
-    figures = {
-        word.rstrip(".%")
-        for word in WORD.findall(message)
-        if number_of(word) is not None
-    }
-    found = {
-        word for word in found if not any(word in other for other in found - {word})
-    } | figures
-    return sorted(found, key=lambda word: (message.find(word), word))[:14]
+    words = {*re.findall(r"[A-Za-z][\w-]+", given), *re.findall(r"(\w+) =", given)}
+    words -= ORDINARY
+    words &= {*re.findall(r"[A-Za-z](?:[\w-]*\w)?", message)}
+    found = {word.strip("./") for word in names(message) | words}
+    found.update(re.findall(r"\[+[a-z.]+\]+", message))
+    found = {word for word in found if is_recorded(word, words)}
+    found = {word for word in found if not is_part(word, found)}
+    for word in WORD.findall(message):
+        if number_of(word) is not None:
+            found.add(word.rstrip(".%"))
+    in_order = sorted(found, key=lambda word: (message.find(word), word))
+    return in_order[:MOST_NAMES]
+
+
+def is_recorded(word: str, given: set[str]) -> bool:
+    """Return whether a name of a refusal is one that counts. given: words of the
+    case."""
+    if not 0 < len(word) <= 60 or word in TYPES:
+        return False
+    if re.search("#|_plugin_", word):  # masked, or of a temporary name
+        return False
+    return len(word) > 1 or word in given
+
+
+def is_part(word: str, others: set[str]) -> bool:
+    """Return whether a word is part of another one."""
+    return any(word in other for other in others - {word})
 
 
 def outcome(section: str, case: str) -> str:
-    """A case's end as it is recorded."""
+    """Return a case's end as it is recorded."""
     code, message = refused(section, case)
-    cure = " cure" * bool(CURE.search(message.partition(": ")[2] or message))
-    return f"{code} {json.dumps(named(message, f'{section} {case}'), ensure_ascii=False)}{cure}"
+    found = named(message, f"{section} {case}")
+    line = f"{code} {json.dumps(found, ensure_ascii=False)}"
+    if CURE.search(message.partition(": ")[2] or message):
+        return f"{line} cure"
+    return line
 
 
 def still(recorded: str, section: str, case: str) -> str:
@@ -345,6 +358,7 @@ def still(recorded: str, section: str, case: str) -> str:
 
 
 def is_named(name: str, message: str) -> bool:
+    """Return whether a message has a name, or a number but for its last digits."""
     number = number_of(name)
     if number is None:
         return name in message
@@ -352,8 +366,9 @@ def is_named(name: str, message: str) -> bool:
 
 
 def read_refusals() -> dict[tuple[str, str], str]:
-    """(section, case): what is recorded of it, "" for a case that is new."""
-    found, section = {}, ""
+    """Return (section, case): what is recorded of it, "" for a case that is new."""
+    found: dict[tuple[str, str], str] = {}
+    section = ""
     for line in REFUSALS.read_text().splitlines():
         if line.startswith("[") and line.endswith("]"):
             section = line[1:-1]
@@ -366,64 +381,73 @@ def read_refusals() -> dict[tuple[str, str], str]:
 # keys.txt: what scenes may say, and programs lean on.
 
 
+KEY = re.compile(r"  (\w+)  +(\S.*?)  +(\S.*?)  +(\S.*?)(?:  |$)")
+
+
 def keys() -> Iterator[str]:
-    """Every key of a scene file with its type, unit and default; the schema, less its
-    descriptions; names in Python, and what is taken where an argument is left out."""
+    """Yield every key of a scene file with its type, unit and default; the schema, less
+    its descriptions; names in Python, and what is taken where an argument is left
+    out."""
     import geomech as top
 
     table = ""
     for line in geomech("reference")[1].splitlines():
-        if line.startswith("  ") and (
-            found := re.match(r"  (\w+)  +(\S.*?)  +(\S.*?)  +(\S.*?)(?:  |$)", line)
-        ):
+        found = KEY.match(line)
+        if found:
             yield f"key {table}: {' | '.join(found.groups())}"
         elif line.startswith("["):
             table = line
         elif line == "above all tables":
             table = "[]"
-    yield from (
-        f"schema {line}".replace("/$defs/", "/")
-        for line in of_schema(json.loads(geomech("reference", "--json-schema")[1]))
-    )
-    yield from (
-        f"geomech.{name}" for name in sorted(dir(top)) if not name.startswith("_")
-    )
-    yield from sorted(
-        {line for module in DOORS for line in defaults(importlib.import_module(module))}
-    )
+    schema = json.loads(geomech("reference", "--json-schema")[1])
+    for line in of_schema(schema):
+        yield f"schema {line}".replace("/$defs/", "/")
+    for name in sorted(public_names(top)):
+        yield f"geomech.{name}"
+    lines: set[str] = set()
+    for door in DOORS:
+        lines.update(defaults(importlib.import_module(door)))
+    yield from sorted(lines)
 
 
 def defaults(module) -> Iterator[str]:
-    """The arguments with defaults of the functions, classes and methods that a module
-    offers."""
-    for name, x in (
-        (name, getattr(module, name))
-        for name in dir(module)
-        if not name.startswith("_")
-    ):
-        if callable(x) and re.match(
-            "(geomech|rft)[.]", getattr(x, "__module__", None) or ""
-        ):
-            methods = vars(x) if isinstance(x, type) else {}
-            parts = {"": x} | {
-                f".{k}": getattr(x, k) for k in methods if not k.startswith("_")
-            }
-            if isinstance(x, enum.EnumMeta):
-                del parts[""]  # arguments that differ between versions of Python
-            for part, f in parts.items():
-                some = inspect.signature(f).parameters.values() if callable(f) else ()
-                if found := [
-                    f"{p.name}={p.default!r}" for p in some if p.default is not p.empty
-                ]:
-                    line = f"default {x.__module__.partition('.')[0]}: {name}{part}({', '.join(found)})"
-                    yield re.sub(" at 0x[0-9a-f]+", "", line)
+    """Yield the arguments with defaults of the functions, classes and methods that a
+    module offers."""
+    for name in public_names(module):
+        offered = getattr(module, name)
+        origin = getattr(offered, "__module__", None) or ""
+        if not callable(offered) or not origin.startswith(("geomech.", "rft.")):
+            continue
+        parts = {name: offered}
+        if isinstance(offered, type):
+            for method in vars(offered):
+                if not method.startswith("_"):
+                    parts[f"{name}.{method}"] = getattr(offered, method)
+        if isinstance(offered, enum.EnumMeta):
+            del parts[name]  # arguments that differ between versions of Python
+        for part, function in parts.items():
+            arguments = ", ".join(given_defaults(function))
+            if arguments:
+                line = f"default {origin.partition('.')[0]}: {part}({arguments})"
+                yield re.sub(" at 0x[0-9a-f]+", "", line)
+
+
+def given_defaults(function) -> Iterator[str]:
+    """Yield "name=default" of the arguments of a function; nothing of what is none."""
+    if not callable(function):
+        return
+    for parameter in inspect.signature(function).parameters.values():
+        if parameter.default is not parameter.empty:
+            yield f"{parameter.name}={parameter.default!r}"
 
 
 def of_schema(node, path: str = "", before: dict | None = None) -> Iterator[str]:
     """A JSON Schema without its descriptions: a line for what takes little room, else
     one for each of its entries, those of a list by their kind where they have one.
     before: what was told already, and where."""
-    text, before = compact(undescribed(node)), {} if before is None else before
+    if before is None:
+        before = {}
+    text = compact(undescribed(node))
     if len(text) <= 200 or not isinstance(node, (dict, list)):
         yield f"{path} {text}"
     elif before.setdefault(text, path) != path:
@@ -432,9 +456,12 @@ def of_schema(node, path: str = "", before: dict | None = None) -> Iterator[str]
         for k, inner in enumerate(node):
             yield from of_schema(inner, f"{path}/{kind_of(inner) or k}", before)
     else:
-        small = {k: x for k, x in undescribed(node).items() if len(compact(x)) <= 60}
+        small = {}
+        for key, inner in undescribed(node).items():
+            if len(compact(inner)) <= 60:
+                small[key] = inner
         yield f"{path} {compact(small)}"
-        for key in sorted(set(node) - set(small) - {"description"}):
+        for key in sorted({*node} - {*small} - {"description"}):
             here = f"{path}/{key}".replace("/properties", "").replace("/oneOf", "")
             yield from of_schema(node[key], here, before)
 
@@ -444,63 +471,81 @@ def compact(node) -> str:
 
 
 def kind_of(node: dict) -> str:
-    consts = [
-        x["const"]
-        for x in node.get("properties", {}).values()
-        if isinstance(x, dict) and "const" in x
-    ]
-    return " ".join(consts)
+    """Return the constants by which an entry of a schema is told from others."""
+    constants = []
+    for inner in node.get("properties", {}).values():
+        if isinstance(inner, dict) and "const" in inner:
+            constants.append(inner["const"])
+    return " ".join(constants)
 
 
 def undescribed(node):
-    if isinstance(node, dict):
-        return {
-            k: undescribed(x)
-            for k, x in node.items()
-            if k != "description" or not isinstance(x, str)
-        }
-    return [undescribed(x) for x in node] if isinstance(node, list) else node
+    """Return a schema without its descriptions; a key may have that name."""
+    if isinstance(node, list):
+        return [undescribed(inner) for inner in node]
+    if not isinstance(node, dict):
+        return node
+    kept = {}
+    for key, inner in node.items():
+        if key != "description" or not isinstance(inner, str):
+            kept[key] = undescribed(inner)
+    return kept
 
 
 # All of it.
 
 
-def words_of(lines: list[str]) -> list[str]:
-    """Lines without their numbers, to see whether wording changed."""
-    return [
-        WORD.sub(lambda word: "#" if number_of(word[0]) is not None else word[0], line)
-        for line in lines
-    ]
-
-
 def write(say=print) -> None:
-    """Records all that does not hold, and new wording; what holds keeps its digits and
+    """Record all that does not hold, and new wording; what holds keeps its digits and
     names."""
-    lines = [line for line in COMMANDS.read_text().splitlines() if line.startswith("#")]
+    write_commands(say)
+    write_refusals(say)
+    write_keys(say)
+
+
+def comments(file: pathlib.Path) -> list[str]:
+    return [line for line in file.read_text().splitlines() if line.startswith("#")]
+
+
+def write_commands(say) -> None:
+    lines = comments(COMMANDS)
     recorded = read_commands()
-    for command, new in outcomes(list(recorded)).items():
+    for command, new in outcomes([*recorded]).items():
         old = recorded[command]
-        if found := differs(old, new):
+        found = differs(old, new)
+        if found:
             say(f"geomech {command}: {found if old else 'new'}")
-        lines += [
-            f"$ geomech {command}",
-            *(new if found or words_of(old) != words_of(new) else old),
-        ]
+        is_new = found or [*map(bare, old)] != [*map(bare, new)]
+        lines += [f"$ geomech {command}", *(new if is_new else old)]
     COMMANDS.write_text("\n".join(lines) + "\n")
-    lines, last = (
-        [line for line in REFUSALS.read_text().splitlines() if line.startswith("#")],
-        "",
-    )
+
+
+def write_refusals(say) -> None:
+    lines = comments(REFUSALS)
+    last = ""
     with place():
-        for (section, case), old in read_refusals().items():
-            if not old or (found := still(old, section, case)):
-                say(f"[{section}] {case}: {found if old else 'new'}")
-                old = outcome(section, case)
-            lines += [f"[{section}]"] * (section != last) + [f"{case} :: {old}"]
+        for (section, case), recorded in read_refusals().items():
+            end = recorded
+            found = "new"
+            if recorded:
+                found = still(recorded, section, case)
+            if found:
+                say(f"[{section}] {case}: {found}")
+                end = outcome(section, case)
+            if section != last:
+                lines.append(f"[{section}]")
+            lines.append(f"{case} :: {end}")
             last = section
     REFUSALS.write_text("\n".join(lines) + "\n")
-    old, new = KEYS.read_text().splitlines() if KEYS.exists() else [], list(keys())
-    for sign, some in (("no more", set(old) - set(new)), ("new", set(new) - set(old))):
-        for line in sorted(some):
-            say(f"{sign}: {line}")
+
+
+def write_keys(say) -> None:
+    old = []
+    if KEYS.exists():
+        old = KEYS.read_text().splitlines()
+    new = [*keys()]
+    for line in sorted({*old} - {*new}):
+        say(f"no more: {line}")
+    for line in sorted({*new} - {*old}):
+        say(f"new: {line}")
     KEYS.write_text("\n".join(new) + "\n")

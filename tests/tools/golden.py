@@ -455,13 +455,26 @@ def pictures():
 ASKED = {
     "gait": (
         names.scene_names,
-        "displacement {} --amplitudes 0.3,0.9", "ccf {}", "connection {} -o x.nc", "run {} -o d", "lab {} -o x.html",
-        "sweep {} --over gait.amplitude=0.3,0.6 -o x.nc", "trajectory {} --cycles 3", "forces {}", "accuracy {}",
-        "optimize {} --objective speed", "optimize {} --objective efficiency --starts 3",
+        "displacement {} --amplitudes 0.3,0.9",
+        "ccf {}",
+        "connection {} -o x.nc",
+        "run {} -o d",
+        "lab {} -o x.html",
+        "sweep {} --over gait.amplitude=0.3,0.6 -o x.nc",
+        "trajectory {} --cycles 3",
+        "forces {}",
+        "accuracy {}",
+        "optimize {} --objective speed",
+        "optimize {} --objective efficiency --starts 3",
     ),
     "intruder": (names.intruder_names, "intrude {}", "accuracy {}"),
-    "walker": (names.walker_names, "walk {}", "sweep {} --over gait.frequency=1,2 -o x.nc", "accuracy {}"),
-}  # fmt: skip
+    "walker": (
+        names.walker_names,
+        "walk {}",
+        "sweep {} --over gait.frequency=1,2 -o x.nc",
+        "accuracy {}",
+    ),
+}
 # Lines whose gaits or falls come first.
 SLOW = (
     "(accuracy|optimize) (sandfish|shovel)|sandbot|(walk|sweep) screws|-close|coulomb"

@@ -67,14 +67,27 @@ def struct(length=1.0, drag=1.0, frame="link-2", base="center", **more):
     }
     content["Avec_optimized"] = cell(unit * A, (3, 2))
     return {
-        "geometry": {"type": "n-link chain", "linklengths": [1, 1, 1], "baseframe": base, "length": length},
+        "geometry": {
+            "type": "n-link chain",
+            "linklengths": [1, 1, 1],
+            "baseframe": base,
+            "length": length,
+        },
         "physics": {"drag_ratio": 2, "drag_coefficient": drag},
         "grid": {"eval": grids[0], "metric_eval": grids[1]},
         "vecfield": {"eval": {"content": content, "type": "eval"}},
-        "metricfield": {"metric_eval": {"content": {"metric": cell(drag * length**3 * own.M, (2, 2))}}},
+        "metricfield": {
+            "metric_eval": {
+                "content": {"metric": cell(drag * length**3 * own.M, (2, 2))}
+            }
+        },
         "B_optimized": {"eval": {"Beta": cell(unit[..., 0] * pose, (3,))}},
-        "DA": DA, "DA_optimized": DA_optimised, "singularity": 0, "system_type": "drag", **more,
-    }  # fmt: skip
+        "DA": DA,
+        "DA_optimized": DA_optimised,
+        "singularity": 0,
+        "system_type": "drag",
+        **more,
+    }
 
 
 def save(path, s, version=5, **more):
