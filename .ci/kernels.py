@@ -49,8 +49,8 @@ def build(folder: Path, root: Path) -> Path:
     import numpy as np
 
     from rft import Chain, Granular, body_velocity, time_steps
-    from rft.balance import kernels, walks
-    from rft.effects import EFFECTS
+    from rft.balance import joints, kernels, walks
+    from rft.effects import EFFECTS, Springs
     from rft.laws.records import Terms
 
     # Kernels know their types once they are called; solutions of this law fold at this
@@ -67,6 +67,8 @@ def build(folder: Path, root: Path) -> Path:
         gait = np.cos(phase + shape), -np.sin(phase + shape)
         options = {"effects": effects, "cycles": 1, "backend": "numba"}
         time_steps(Granular(1.8, 0.24), Chain(), *gait, **options)
+    springs = {"effects": [Springs(stiffness=0.1)], "cycles": 1, "backend": "numba"}
+    time_steps(Granular(1.8, 0.24), Chain(), *gait, **springs)
     code = CC(NAME)
     code.output_dir = str(folder)
     code.target_cpu = PROCESSOR
@@ -74,6 +76,7 @@ def build(folder: Path, root: Path) -> Path:
         ("solve", kernels.kernel(Terms)),
         ("velocities", kernels.chain_kernel(Terms)),
         ("walk", walks.walk_kernel(Terms)),
+        ("joint_steps", joints.step_kernel(Terms)),
         ("velocities_of_elements", kernels.velocity_kernel()),
         *(
             (kind.element_update.__name__, kernels.element_kernel(kind.element_update))

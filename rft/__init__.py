@@ -20,25 +20,26 @@ if TYPE_CHECKING:
         GrainInertia,
         SkinFriction,
         Slope,
+        Springs,
         TowedSled,
         Transient,
     )
     from rft.laws import CATALOGUE, Coulomb, Granular, Medium, Surface, Table, Viscous
-    from rft.motion.stepping import TimeSteps, time_steps
+    from rft.motion.cycles import TimeSteps, time_steps
     from rft.motion.work import Work, work_done
 
 # Version of the numbers, raised with every change of one; results of other versions are
 # not resumed.
-SOLVER = 13
+SOLVER = 14
 _NAMES = {
     "rft.balance.force": "LinkForce link_force",
     "rft.balance.velocity": "BodyVelocity Solution body_velocity",
     "rft.bodies": "Backbone Body Chain ConstantCurvature Serpenoid",
     "rft.effects": "BodyInertia DepthProfile DisturbedGround EndCaps GrainInertia "
-    "SkinFriction Slope TowedSled Transient",
+    "SkinFriction Slope Springs TowedSled Transient",
     "rft.laws": "CATALOGUE Coulomb Granular Medium Surface Table Viscous",
     "rft.core.refusal": "Refusal",
-    "rft.motion.stepping": "TimeSteps time_steps",
+    "rft.motion.cycles": "TimeSteps time_steps",
     "rft.motion.work": "Work work_done",
 }
 # Modules by the names that they define.
@@ -82,6 +83,7 @@ __all__ = [
     "SkinFriction",
     "Slope",
     "Solution",
+    "Springs",
     "Surface",
     "Table",
     "TimeSteps",

@@ -11,6 +11,7 @@ import numpy as np
 
 from rft import CATALOGUE, Chain, Granular, Transient, body_velocity, time_steps
 from rft.balance.backend import check, preferring
+from rft.effects import Springs
 from rft.laws.records import record
 from rft.terradynamics.ground import Ground
 from rft.terradynamics.meshes import Spatial
@@ -36,7 +37,8 @@ def compile_balances() -> None:
     body_velocity(FOLDING_LAW, Chain(), FOLDING_SHAPE, FOLDING_RATE)
     phase = np.linspace(0.0, 2 * np.pi, 8, endpoint=False)[:, None]
     circle = np.cos(phase - FOLDING_SHAPE), -np.sin(phase - FOLDING_SHAPE)
-    time_steps(LAW, Chain(), *circle, effects=[Transient(travel=0.1)], cycles=1)
+    for effect in (Transient(travel=0.1), Springs(stiffness=0.1)):
+        time_steps(LAW, Chain(), *circle, effects=[effect], cycles=1)
 
 
 def compile_plates() -> None:

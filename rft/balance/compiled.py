@@ -48,6 +48,18 @@ def kernels_of(Law: type) -> Kernels:
 
 
 @functools.cache
+def joint_kernel(Law: type) -> Callable:
+    """Return the compiled steps of joints that give way for one class of law records,
+    and load numba where they are not built yet."""
+    if ahead.has(Law):
+        return ahead.library().joint_steps
+
+    from rft.balance import joints
+
+    return joints.step_kernel(Law)
+
+
+@functools.cache
 def velocity_kernel() -> Callable:
     """Return the compiled velocities of elements, and load numba where it is not built
     yet."""

@@ -312,9 +312,10 @@ def kernel(Law: type):
     return cached(solve, f"the force balance for laws of the form {Law.__name__}")
 
 
-# Rows of the shape of a chain: the heading of each link, its centre x + i y, and the
-# rates of these.
-HEADING, TURN, X, Y, V_X, V_Y = range(6)
+# Rows of the shape of a chain: the heading of each link, its centre x + i y, the rates
+# of these, and the cosine and the sine of the heading.
+HEADING, TURN, X, Y, V_X, V_Y, COS, SIN = range(8)
+LINK_ROWS = 8  # number of rows
 CHAINS_TOGETHER = 1024  # samples whose links are computed before they are solved
 
 
@@ -355,33 +356,68 @@ def to_frame(chain, rows, j):
 
 
 @register_jitable
-def pose_links(chain, shape, rate, rows):
-    """Write the links in the body frame at a shape and its rate, (joints,) each, to
-    ``rows`` (6, n), as `rft.bodies.Chain` computes them."""
+def place_links(chain, shape, rows):
+    """Write where the links are in the body frame at a shape (joints,) to ``rows``
+    (LINK_ROWS, n), as `rft.bodies.Chain` computes it."""
     n = rows.shape[1]
     rows[HEADING, 0] = 0.0
-    rows[TURN, 0] = 0.0
     for k in range(n - 1):
         rows[HEADING, k + 1] = rows[HEADING, k] + joint_angle(chain, shape, k)
-        rows[TURN, k + 1] = rows[TURN, k] + joint_angle(chain, rate, k)
     to_frame(chain, rows, HEADING)
-    to_frame(chain, rows, TURN)
-    x = y = v_x = v_y = 0.0  # of the joint between links
+    x = y = 0.0  # of the joint between links
     for k in range(n):
         half = 0.5 * chain.fractions[k]
-        c = half * np.cos(rows[HEADING, k])
-        s = half * np.sin(rows[HEADING, k])
-        turn = rows[TURN, k]
+        rows[COS, k] = np.cos(rows[HEADING, k])
+        rows[SIN, k] = np.sin(rows[HEADING, k])
+        c = half * rows[COS, k]
+        s = half * rows[SIN, k]
         rows[X, k] = x + c
         rows[Y, k] = y + s
-        rows[V_X, k] = v_x - turn * s
-        rows[V_Y, k] = v_y + turn * c
         x += 2.0 * c
         y += 2.0 * s
+    to_frame(chain, rows, X)
+    to_frame(chain, rows, Y)
+
+
+@register_jitable
+def move_links(chain, rate, rows):
+    """Write the rates of the links that `place_links` has placed, at a rate (joints,)
+    of the shape, to ``rows``."""
+    n = rows.shape[1]
+    rows[TURN, 0] = 0.0
+    for k in range(n - 1):
+        rows[TURN, k + 1] = rows[TURN, k] + joint_angle(chain, rate, k)
+    to_frame(chain, rows, TURN)
+    v_x = v_y = 0.0  # of the joint between links
+    for k in range(n):
+        half = 0.5 * chain.fractions[k]
+        c = half * rows[COS, k]
+        s = half * rows[SIN, k]
+        turn = rows[TURN, k]
+        rows[V_X, k] = v_x - turn * s
+        rows[V_Y, k] = v_y + turn * c
         v_x -= 2.0 * turn * s
         v_y += 2.0 * turn * c
-    for j in range(X, V_Y + 1):
-        to_frame(chain, rows, j)
+    to_frame(chain, rows, V_X)
+    to_frame(chain, rows, V_Y)
+
+
+@register_jitable
+def link_lever(rows, k):
+    """Return r_t and r_n of `Elements` of link k."""
+    x = rows[X, k]
+    y = rows[Y, k]
+    c = rows[COS, k]
+    s = rows[SIN, k]
+    return x * s - y * c, x * c + y * s
+
+
+@register_jitable
+def link_velocity(rows, k):
+    """Return v_t and v_n of `Elements` of link k."""
+    c = rows[COS, k]
+    s = rows[SIN, k]
+    return rows[V_X, k] * c + rows[V_Y, k] * s, rows[V_Y, k] * c - rows[V_X, k] * s
 
 
 @register_jitable
@@ -392,17 +428,13 @@ def write_links(chain, rows, elements, frame, i):
     mean_x = 0.0
     mean_y = 0.0
     for k in range(rows.shape[1]):
-        x = rows[X, k]
-        y = rows[Y, k]
-        c[k, i] = np.cos(rows[HEADING, k])
-        s[k, i] = np.sin(rows[HEADING, k])
-        r_t[k, i] = x * s[k, i] - y * c[k, i]
-        r_n[k, i] = x * c[k, i] + y * s[k, i]
-        v_t[k, i] = rows[V_X, k] * c[k, i] + rows[V_Y, k] * s[k, i]
-        v_n[k, i] = rows[V_Y, k] * c[k, i] - rows[V_X, k] * s[k, i]
+        c[k, i] = rows[COS, k]
+        s[k, i] = rows[SIN, k]
+        r_t[k, i], r_n[k, i] = link_lever(rows, k)
+        v_t[k, i], v_n[k, i] = link_velocity(rows, k)
         v_w[k, i] = rows[TURN, k] * half[k, 0]
-        mean_x += chain.fractions[k] * x
-        mean_y += chain.fractions[k] * y
+        mean_x += chain.fractions[k] * rows[X, k]
+        mean_y += chain.fractions[k] * rows[Y, k]
     frame[0][0, i] = mean_x
     frame[1][0, i] = mean_y
 
@@ -423,7 +455,7 @@ def chain_kernel(Law: type):
         xi, residual, code, evaluations = found
         n = len(chain.fractions)
         size = len(alpha)
-        rows = np.empty((6, n))
+        rows = np.empty((LINK_ROWS, n))
         half = np.empty((n, 1))
         weight = np.empty((n, 1))
         for k in range(n):
@@ -471,7 +503,8 @@ def chain_kernel(Law: type):
             for j in range(count):
                 shape = alpha[moving[j]]
                 rate = alphadot[moving[j]]
-                pose_links(chain, shape, rate, rows)
+                place_links(chain, shape, rows)
+                move_links(chain, rate, rows)
                 write_links(chain, rows, elements, frame, j)
                 speed = joint_speed(chain, rate)
                 above_1 = max(speed - 1.0, 0.0)

@@ -105,7 +105,7 @@ def solve(
     if starts and 0 < size <= min(batch, worth):
         # Few samples, which most often take one descent: nothing is shared out.
         problem = problem_at(unsolved)
-        limits = _limits(problem, accuracy)
+        limits = problem_limits(problem, accuracy)
         descent = begin(methods.pop(0), linear, limits)
         results = descend_all(problem, descent, limits, guess)
         report(size, assembly.n_law_points, linear)
@@ -130,7 +130,7 @@ def solve(
             if stop.is_set():
                 return
             problem = problem_at(index)
-            limits = _limits(problem, accuracy)
+            limits = problem_limits(problem, accuracy)
             if index.size == size:
                 index = slice(None)  # a slice is quicker
             first = None
@@ -148,7 +148,7 @@ def solve(
                 walk_together(problem, index[run])
 
     def walk_together(problem, index) -> None:
-        limits = _limits(problem, accuracy)
+        limits = problem_limits(problem, accuracy)
         for i, ended in walk_all(problem, limits, *method):
             solved = ended[RESIDUAL] <= limits.residual
             store(index[i[solved]], ended[:, solved], limits)
@@ -207,7 +207,7 @@ def begin(descent: Descent, linear: bool, limits: Limits) -> Descent:
     return Descent(first, *descent[1:])
 
 
-def _limits(problem: Problem, accuracy: Accuracy) -> Limits:
+def problem_limits(problem: Problem, accuracy: Accuracy) -> Limits:
     """Return the limits of a problem, whose residual allows for roundoff of the largest
     forces."""
     rounding, residual, *_ = limits_of(problem, accuracy)
@@ -241,7 +241,7 @@ def from_guess(
     from a guess: what `solve` does first, with less work around it, for a small batch.
 
     solve_once: the function ``solve`` of the driver."""
-    limits = _limits(problem, accuracy)
+    limits = problem_limits(problem, accuracy)
     descent = begin(WARM, assembly.linear, limits)
     with np.errstate(over="ignore"):
         guess = guess / scale

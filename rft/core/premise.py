@@ -14,6 +14,7 @@ class Premise(Flag):
     SE2_SYMMETRIC = auto()  # xi does not depend on the pose on the ground
     MEMORYLESS = auto()  # xi does not depend on the past
     QUASI_STATIC = auto()  # forces balance, mass is negligible
+    PRESCRIBED_SHAPE = auto()  # the shape is that of the gait
 
     @property
     def words(self) -> list[str]:
@@ -29,11 +30,14 @@ WORDS = {
     Premise.SE2_SYMMETRIC: "SE(2)-symmetric",
     Premise.MEMORYLESS: "memoryless",
     Premise.QUASI_STATIC: "quasi-static",
+    Premise.PRESCRIBED_SHAPE: "prescribed in shape",
 }
 NONE = Premise(0)
 ALL = ~Premise(0)
 # With these a body velocity follows from shape and its rate alone.
 SHAPE_ALONE = Premise.SE2_SYMMETRIC | Premise.MEMORYLESS | Premise.QUASI_STATIC
+# With these it follows from the gait's phase, too, and no time steps are needed.
+PHASE_ALONE = SHAPE_ALONE | Premise.PRESCRIBED_SHAPE
 
 
 def negation(broken: Premise) -> str:

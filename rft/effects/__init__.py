@@ -23,6 +23,7 @@ from rft.effects.end_caps import EndCaps
 from rft.effects.grain_inertia import GrainInertia
 from rft.effects.skin import SkinFriction
 from rft.effects.slope import Slope
+from rft.effects.springs import Springs
 from rft.effects.towed import TowedSled
 from rft.effects.transient import Transient
 
@@ -40,6 +41,7 @@ __all__ = [
     "Site",
     "SkinFriction",
     "Slope",
+    "Springs",
     "TowedSled",
     "Transient",
     "batched_effect",

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from rft.core.checks import in_range, number_fields
-from rft.core.premise import NONE, SHAPE_ALONE, Premise
+from rft.core.premise import NONE, PHASE_ALONE, Premise
 from rft.core.refusal import Refusal, located, require
 from rft.core.registry import Registry, subclasses
 from rft.effects.contact import Problem
@@ -218,6 +218,9 @@ class Effect:
     def check(self, medium: Any) -> None:
         """Raise ValueError for a medium that the effect does not take."""
 
+    def check_body(self, body: Any, medium: Any) -> None:
+        """Raise ValueError for a body that the effect does not take in a medium."""
+
     @classmethod
     def examples(cls, x: float = 0.3) -> dict[str, Self]:
         """Return effects by name, the one of ``order`` by ``kind`` alone, that vanish
@@ -226,7 +229,7 @@ class Effect:
 
     def apply(self, problem: Problem, site: Site | None, state: Any) -> Problem:
         """Return the problem with this effect; site and state are None unless the
-        effect breaks a premise of `rft.core.premise.SHAPE_ALONE`."""
+        effect breaks a premise of `rft.core.premise.PHASE_ALONE`."""
         raise NotImplementedError
 
     def begin(self, problem: Problem, site: Site) -> Any:
@@ -301,7 +304,7 @@ def stepwise_effects(effects: Sequence[Effect]) -> list[Effect]:
     >>> [effect.kind for effect in stepwise_effects(effects)]
     ['transient']
     """
-    return [effect for effect in effects if effect.breaks & SHAPE_ALONE]
+    return [effect for effect in effects if effect.breaks & PHASE_ALONE]
 
 
 def batched_effect(effects: Sequence[Effect], counts: Sequence[int]) -> Effect:
@@ -326,7 +329,8 @@ def batched_effect(effects: Sequence[Effect], counts: Sequence[int]) -> Effect:
                 raise Refusal(
                     first.kind, instead=f"{field.name} cannot differ within a batch"
                 )
-            joined[field.name] = np.repeat(np.array(values, float), counts)
+            # Samples on the last axis.
+            joined[field.name] = np.repeat(np.array(values, float).T, counts, -1)
     return first.with_parameters(**joined)
 
 
@@ -360,4 +364,4 @@ def engine(effects: Sequence[Effect]) -> str:
     broken = broken_premises(effects)
     if broken & Premise.QUASI_STATIC:
         return "dynamic"
-    return "time stepping" if broken & SHAPE_ALONE else "algebraic"
+    return "time stepping" if broken & PHASE_ALONE else "algebraic"

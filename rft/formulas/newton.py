@@ -132,6 +132,18 @@ class Iterate(NamedTuple):
     fresh: float
 
 
+class Progress(NamedTuple):
+    """Scalars of a descent, whatever its unknowns; fields as in `Iterate`."""
+
+    rounding: float
+    rounding_next: float
+    damping: float
+    residual: float
+    slowest: float
+    evaluations: float
+    fresh: float
+
+
 # Triples (x, y, theta) and (v_t, v_n, v_w).
 
 
@@ -260,16 +272,28 @@ def residual_norm(force, frame):
 # The step.
 
 
-@formula
-def newton_step(iterate, net, slowest2, frame, descent, limits):
-    """Return the next iterate, whether the step that led to ``net`` is accepted, and
-    whether the sample has ended.
+class Judgement(NamedTuple):
+    """What follows from the residual after a step.
 
-    slowest2: square of the slowest element's speed after that step.
-    """
+    fresh: whether it was the step to the viscous solution, before any other. accepted:
+    whether the step is taken. ends_level: whether its level of rounding is solved.
+    lower: rounding of the next level. prediction: change of the logarithm of all
+    velocities, along the tangent, that leads to it. damping: factor of Newton's next
+    step."""
+
+    fresh: bool
+    accepted: bool
+    ends_level: bool
+    lower: float
+    prediction: float
+    damping: float
+
+
+@formula
+def judge_step(iterate, residual, slowest, descent, limits):
+    """Return the `Judgement` of the step that led to a residual, with the slowest
+    element's speed after it, for a balance of any number of unknowns."""
     last = limits.rounding
-    residual = residual_norm(net.force, frame)
-    slowest = sqrt(slowest2)
     fresh = iterate.fresh > 0.0
     rounding = iterate.rounding_next
     helps = (
@@ -291,29 +315,65 @@ def newton_step(iterate, net, slowest2, frame, descent, limits):
     damping = where(
         fresh, iterate.damping, minimum(1.0, limits.damping_growth * iterate.damping)
     )
-    right = plus(times(prediction, net.by_speed), times(-damping, net.force))
+    return Judgement(fresh, accepted, ends_level, lower, prediction, damping)
+
+
+@formula
+def progress_after(iterate, residual, slowest, judged, descent):
+    """Return the `Progress` after a step that led to a residual, with its
+    `Judgement`."""
+    fresh = judged.fresh
+    accepted = judged.accepted
+    rounding = iterate.rounding_next
+    evaluations = iterate.evaluations + where(fresh, 0.0, 1.0)
+    return Progress(
+        where(fresh, descent.first, rounding),
+        where(fresh, descent.first, where(judged.ends_level, judged.lower, rounding)),
+        where(accepted | fresh, judged.damping, 0.5 * iterate.damping),
+        where(accepted, residual, iterate.residual),
+        where(accepted, slowest, iterate.slowest),
+        evaluations,
+        0.0 * evaluations,
+    )
+
+
+@formula
+def newton_step(iterate, net, slowest2, frame, descent, limits):
+    """Return the next iterate, whether the step that led to ``net`` is accepted, and
+    whether the sample has ended.
+
+    slowest2: square of the slowest element's speed after that step.
+    """
+    residual = residual_norm(net.force, frame)
+    slowest = sqrt(slowest2)
+    judged = judge_step(iterate, residual, slowest, descent, limits)
+    after = progress_after(iterate, residual, slowest, judged, descent)
+    fresh = judged.fresh
+    accepted = judged.accepted
+    by_speed = times(judged.prediction, net.by_speed)
+    right = plus(by_speed, times(-judged.damping, net.force))
     x, y, theta = solve3(net.by_x, net.by_y, net.by_theta, right)
     fraction = where(fresh, 1.0, step_fraction(x, y, theta, frame, limits.largest_step))
     new_step = accepted | fresh
     moved = where(accepted, 1.0, 0.0)
-    evaluations = iterate.evaluations + where(fresh, 0.0, 1.0)
-    solved = accepted & (rounding <= last) & (residual <= limits.residual)
-    after = Iterate(
+    is_last = iterate.rounding_next <= limits.rounding
+    solved = accepted & is_last & (residual <= limits.residual)
+    new = Iterate(
         iterate.x + moved * iterate.dx,
         iterate.y + moved * iterate.dy,
         iterate.theta + moved * iterate.dtheta,
         where(new_step, fraction * x, 0.5 * iterate.dx),
         where(new_step, fraction * y, 0.5 * iterate.dy),
         where(new_step, fraction * theta, 0.5 * iterate.dtheta),
-        where(fresh, descent.first, rounding),
-        where(fresh, descent.first, where(ends_level, lower, rounding)),
-        where(new_step, damping, 0.5 * iterate.damping),
-        where(accepted, residual, iterate.residual),
-        where(accepted, slowest, iterate.slowest),
-        evaluations,
-        0.0 * evaluations,
+        after.rounding,
+        after.rounding_next,
+        after.damping,
+        after.residual,
+        after.slowest,
+        after.evaluations,
+        after.fresh,
     )
-    return after, accepted, solved | (evaluations >= descent.budget)
+    return new, accepted, solved | (after.evaluations >= descent.budget)
 
 
 @formula
@@ -351,6 +411,16 @@ def step_fraction(x, y, theta, frame, largest):
     size = sqrt(mean_x * mean_x + mean_y * mean_y + theta * theta)
     may_exceed = maximum(maximum(absolute(x), absolute(y)), absolute(theta)) > 1.0
     return where(may_exceed, largest / maximum(size, largest), 1.0)
+
+
+@formula
+def compliant_fraction(x, y, theta, rates2, frame, largest):
+    """Return the fraction of a step as `step_fraction` does where joint rates are
+    unknown as well; rates2: sum of the squares of their changes."""
+    mean_x = x - frame.y * theta
+    mean_y = y + frame.x * theta
+    size = sqrt(mean_x * mean_x + mean_y * mean_y + theta * theta + rates2)
+    return largest / maximum(size, largest)
 
 
 @formula

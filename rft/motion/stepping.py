@@ -1,28 +1,22 @@
-"""Time stepping through a gait, for swimmers whose motion depends on place, past or
-mass.
+"""One step of time through a gait: the state of a body between steps, and the balance
+of forces at the next one.
 
 At every phase the balance of forces is solved for the body velocity. Steps are
 implicit: memory is that at the end of the step, momentum follows BDF2, the backward
-difference of order 2, which damps errors at any step. Without memory, slope and mass
-the result is that of `rft.body_velocity` at every phase, and with them it converges to
-that as they go to zero. All samples (amplitudes, parameters) take each step together.
-Time stepping starts from that result on undisturbed ground, and repeats the gait until
-the displacement per cycle no longer changes.
-"""
+difference of order 2, which damps errors at any step. All samples (amplitudes,
+parameters) take each step together."""
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from rft.balance import arrays
 from rft.balance.arrays import frame_net, velocities, with_frame_velocity
-from rft.balance.backend import check, solves_compiled, updates_compiled
+from rft.balance.backend import solves_compiled, updates_compiled
 from rft.balance.solver import (
     ELEMENTS_TOGETHER,
     Accuracy,
@@ -31,297 +25,19 @@ from rft.balance.solver import (
     from_guess,
     solve,
 )
-from rft.balance.velocity import checked_input
-from rft.bodies.base import Body, Elements, body_size, half_lengths, joint_speed
-from rft.bodies.pieces import PIECES
-from rft.core.checks import in_range
+from rft.bodies.base import Elements, joint_speed
 from rft.core.premise import Premise
-from rft.core.refusal import require
 from rft.effects.base import PAST, Effect, Site, broken_premises, stepwise_effects
-from rft.effects.contact import Assembly, Problem, assemble
+from rft.effects.contact import Assembly, Problem
 from rft.formulas.link import TINY
 from rft.formulas.newton import to_element
-from rft.laws.base import Medium
 from rft.motion import limit_cycle
 from rft.motion.work import Work, element_work
 
-MOST_CYCLES = 60
-PLAIN_CYCLES = 12  # before the memory of a body without mass is led to its limit
 # elements x nodes at all phases, up to which their balances are stored: some 8 MB
 MOST_STORED = 100_000
 # of the rms joint speed, below which the joints pause and that speed is the scale
 PAUSE = 1e-9
-
-
-class TimeSteps(NamedTuple):
-    """The last cycle of time stepping at N phases.
-
-    xi: (..., N, 3), body velocity in the body frame, length/rad, length/rad, 1. pose:
-    (..., N + 1, 3), of the body frame on the ground, whose origin and x axis are those
-    of the frame at the first step. residual: (...), the largest, as in `rft.Solution`.
-    status: (...), "periodic", "running" (the requested number of cycles, not yet
-    periodic), "not periodic" or "unconverged". drift: (...), largest component of the
-    sum of all changes of displacement, body lengths and rad, in cycles to come. cycles:
-    their number. work: (..., N) each, or None. path: (..., cycles N + 1, 3), all poses
-    since the first step, or None.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from rft import Chain, Granular, time_steps
-    >>> from rft.effects import Transient
-    >>> t = 2 * np.pi * np.arange(32) / 32
-    >>> alpha = np.stack([np.cos(t), np.sin(t)], -1)
-    >>> alphadot = np.stack([-np.sin(t), np.cos(t)], -1)
-    >>> motion = Granular(1.8, 0.24), Chain(), alpha, alphadot
-    >>> steps = time_steps(*motion, effects=[Transient(travel=0.12)])
-    >>> steps.xi.shape, steps.pose.shape, steps.cycles > 1
-    ((32, 3), (33, 3), True)
-    """
-
-    xi: np.ndarray
-    pose: np.ndarray
-    residual: np.ndarray
-    status: np.ndarray
-    drift: np.ndarray
-    cycles: int
-    work: Work | None
-    path: np.ndarray | None = None
-
-    def __repr__(self) -> str:
-        kinds = ", ".join(
-            f"{n} {kind}"
-            for kind, n in zip(*np.unique(self.status, return_counts=True))
-        )
-        count = np.size(self.status)
-        gaits = "1 gait" if count == 1 else f"{count} gaits"
-        residual = np.max(self.residual, initial=0.0)
-        return (
-            f"TimeSteps({gaits} of {np.shape(self.xi)[-2]} phases, {self.cycles} "
-            f"cycles: {kinds}; residual up to {residual:.1e})"
-        )
-
-    @property
-    def displacement(self) -> np.ndarray:
-        """Pose after the cycle in the frame at its start, (..., 3)."""
-        start = np.moveaxis(self.pose[..., 0, :], -1, 0)
-        end = np.moveaxis(self.pose[..., -1, :], -1, 0)
-        return np.moveaxis(_relative_pose(start, end), 0, -1)
-
-    def checked(self) -> TimeSteps:
-        """Return these steps; RuntimeError if any sample is unconverged or not
-        periodic."""
-        if (self.status == "unconverged").any():
-            raise RuntimeError(
-                "a force balance did not converge in time stepping (residual "
-                f"{np.max(self.residual):.1e}): "
-                "raise 'regularisation', or report the scene"
-            )
-        if (self.status == "not periodic").any():
-            raise RuntimeError(
-                f"after {self.cycles} cycles the displacement still differs by "
-                f"{np.max(self.drift):.1e} body lengths from its limit: give 'cycles' "
-                "to accept it, or lower the mass, the ground's weakening or the "
-                "travel of a transient"
-            )
-        return self
-
-
-def time_steps(
-    medium: Medium,
-    body: Body,
-    alpha: ArrayLike,
-    alphadot: ArrayLike,
-    *,
-    effects: Sequence[Effect] = (),
-    cycles: int | None = None,
-    loads: str = "exact",
-    regularisation: float = 1e-6,
-    tolerance: float = 1e-10,
-    pieces: int = PIECES,
-    with_work: bool = False,
-    with_path: bool = False,
-    backend: str = "auto",
-    advance: Callable | None = None,
-) -> TimeSteps:
-    """Return body velocities through a gait, of order 2 in 1/N.
-
-    Parameters
-    ----------
-    alpha, alphadot : arrays (..., N, joints), one cycle at N >= 8 equally spaced
-        phases, rad and per rad of phase.
-    effects : effects of `rft.effects` of any engine.
-    cycles : number of cycles; by default as many as it takes to reach the limit cycle,
-        and one where effects break symmetry, since no two cycles are alike there.
-    with_work, with_path : whether to compute `TimeSteps.work` and `TimeSteps.path`.
-    advance : function that takes the steps of a cycle, by default `take_steps`; another
-        function may store states and resume from them.
-
-    Other parameters as in `rft.body_velocity`.
-
-    Raises
-    ------
-    ValueError
-        For arguments of another shape or out of bounds, and for a medium that pushes.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from rft import Chain, Granular, time_steps
-    >>> from rft.effects import Transient
-    >>> t = 2 * np.pi * np.arange(32) / 32
-    >>> alpha = np.stack([np.cos(t), np.sin(t)], -1)
-    >>> alphadot = np.stack([-np.sin(t), np.cos(t)], -1)
-    >>> motion = Granular(1.8, 0.24), Chain(), alpha, alphadot
-    >>> steps = time_steps(*motion, effects=[Transient(travel=0.12)])
-    >>> steps.pose[-1, :2].round(3)  # x, y after the cycle, body lengths
-    array([-0.245, -0.033])
-    """
-    broken = broken_premises(effects)
-    assembly = assemble(medium, body, effects, loads, pieces)
-    alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, tolerance)
-    check(backend)
-    require(
-        alpha.ndim >= 2 and alpha.shape[-2] >= 8,
-        f"time stepping needs 8 phases or more, got alpha {alpha.shape}",
-    )
-    if cycles is not None:
-        in_range("cycles", cycles, 1, 10_000, whole=True)
-    *batch, phases, joints = alpha.shape
-    batch = tuple(batch)
-    if 0 in batch:
-        return _no_steps(batch, phases)
-    if cycles is None and broken & Premise.SE2_SYMMETRIC:
-        cycles = 1
-    stepping = Stepping(
-        assembly,
-        np.moveaxis(alpha.reshape(-1, phases, joints), 0, -1),
-        np.moveaxis(alphadot.reshape(-1, phases, joints), 0, -1),
-        Accuracy(regularisation, tolerance),
-        backend,
-        cycles is None,
-        half_lengths(body),
-    )
-    steps = _cycles(stepping, cycles, with_work, with_path, advance or take_steps)
-    return _with_batch_axes(steps, batch, body_size(body))
-
-
-def _no_steps(batch: tuple, phases: int) -> TimeSteps:
-    """Return the steps of an empty batch."""
-    none = np.zeros(batch)
-    return TimeSteps(
-        xi=np.zeros((*batch, phases, 3)),
-        pose=np.zeros((*batch, phases + 1, 3)),
-        residual=none,
-        status=none.astype(str),
-        drift=none,
-        cycles=0,
-        work=None,
-    )
-
-
-def take_steps(
-    stepping: Stepping, state: State, count: int, with_work: bool = False
-) -> tuple[State, list[Row]]:
-    """Return the state after ``count`` steps, and their rows."""
-    rows = []
-    for _ in range(count):
-        state, row = stepping.step(state, with_work)
-        rows.append(row)
-    return state, rows
-
-
-def _cycles(
-    stepping: Stepping,
-    cycles: int | None,
-    with_work: bool,
-    with_path: bool,
-    advance: Callable,
-) -> TimeSteps:
-    """Return the last of ``cycles`` cycles, or by default the first one that repeats;
-    samples on the last axis."""
-    path = []
-    state = stepping.begin()
-    mixes = cycles is None and not stepping.heavy and stepping.memory(state).size > 0
-    memories: list[limit_cycle.MemoryCycle] = []
-    gain = np.zeros(0)
-    for cycle in itertools.count(1):
-        start = stepping.memory(state)
-        state, rows = advance(stepping, state, stepping.phases, with_work)
-        pose = np.stack([*(row.pose for row in rows), stepping.next_pose(state)])
-        if with_path:
-            path.append(pose[:-1])
-        if mixes and cycle > 1:  # before the first step there is no memory
-            displacement = _relative_pose(pose[0], pose[-1])
-            end = stepping.memory(state)
-            memories = memories[1 - limit_cycle.MEMORY_HISTORY :]
-            memories.append(limit_cycle.MemoryCycle(start, end, displacement))
-        if mixes and cycle > PLAIN_CYCLES:
-            memory, drift = limit_cycle.mixed_memory(memories, gain)
-            state = state._replace(cycles=state.cycles._replace(drift=drift))
-        if cycle == (cycles or MOST_CYCLES):
-            break
-        if cycles is None and stepping.is_periodic(state):
-            break
-        if mixes and cycle >= PLAIN_CYCLES:
-            if cycle == PLAIN_CYCLES:
-                gain = limit_cycle.memory_gain(memories)
-                memory, _ = limit_cycle.mixed_memory(memories, gain)
-            state = stepping.with_memory(state, memory)
-    xi = np.stack([row.xi for row in rows])
-    worst = np.max([row.residual for row in rows], 0)
-    limit = np.max([row.limit for row in rows])
-    work = None
-    if with_work:
-        work = Work(*map(np.stack, zip(*(row.work for row in rows))))
-    drift = state.cycles.drift
-    other = "not periodic" if cycles is None else "running"
-    status = np.where(drift <= stepping.drift_tolerance, "periodic", other)
-    status = np.where(worst <= limit, status, "unconverged")
-    all_poses = None
-    if with_path:
-        all_poses = np.concatenate([*path, pose[-1:]])
-    return TimeSteps(xi, pose, worst, status, drift, cycle, work, all_poses)
-
-
-def _relative_pose(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return pose b (3, B) in the frame at pose a."""
-    z = ((b[0] - a[0]) + 1j * (b[1] - a[1])) * np.exp(-1j * a[2])
-    return np.stack([z.real, z.imag, b[2] - a[2]])
-
-
-def _integrated(pose: np.ndarray, xi: np.ndarray, dt: float) -> np.ndarray:
-    """Return the pose (3, B) reached from a pose at a constant body velocity xi (3, B)
-    after dt."""
-    moved = dt * xi
-    half = 0.5 * moved[2]
-    chord = np.sin(half + TINY) / (half + TINY)  # over the arc
-    z = chord * np.exp(1j * (pose[2] + half)) * (moved[0] + 1j * moved[1])
-    moved[0] = z.real
-    moved[1] = z.imag
-    return pose + moved
-
-
-def _with_batch_axes(steps: TimeSteps, batch: tuple, length: float) -> TimeSteps:
-    """Return steps with their samples on leading axes, and lengths in the body's
-    unit."""
-    units = np.array([length, length, 1.0])
-
-    def samples_first(x):
-        return np.moveaxis(x, -1, 0).reshape(*batch, -1, 3) * units
-
-    xi, pose = map(samples_first, steps[:2])
-    path = steps.path
-    if path is not None:
-        path = samples_first(path)
-    work = steps.work
-    if work is not None:
-        # From (N, B, ...) to (..., N, ...).
-        first = (np.moveaxis(x, 1, 0) for x in work)
-        work = Work(*(x.reshape((*batch, *x.shape[1:])) for x in first))
-        work = work._replace(power=work.power * length)
-    residual, status, drift = (x.reshape(batch) for x in steps[2:5])
-    return TimeSteps(xi, pose, residual, status, drift, steps.cycles, work, path)
 
 
 class State(NamedTuple):
@@ -344,13 +60,15 @@ class State(NamedTuple):
 
 class Row(NamedTuple):
     """Results of one step. xi, pose: (3, B). residual: (B,). limit: (1,), largest
-    residual of a solved sample. work: of the step, or None."""
+    residual of a solved sample. work: of the step, or None. springs: what joints do
+    that give way (`rft.motion.compliance.SpringMotion`), or None."""
 
     xi: np.ndarray
     pose: np.ndarray
     residual: np.ndarray
     limit: np.ndarray
     work: Work | None
+    springs: Any = None
 
 
 class Stepping:
@@ -442,12 +160,12 @@ class Stepping:
         dt = self.dt if count else 0.0
         pose = s.pose
         if self.reads_place:
-            pose = _integrated(pose, (s.xi + guess) / 2, dt)
+            pose = integrated_pose(pose, (s.xi + guess) / 2, dt)
         return Site(count, dt, pose, s.v)
 
     def next_pose(self, s: State) -> np.ndarray:
         """Return the predicted pose (3, B) at the next step."""
-        return _integrated(s.pose, (s.xi + self.guess(s)) / 2, self.dt)
+        return integrated_pose(s.pose, (s.xi + self.guess(s)) / 2, self.dt)
 
     def begin(self) -> State:
         """Return the state before the first step, on undisturbed ground."""
@@ -482,7 +200,7 @@ class Stepping:
         xi, residual, limit = self._solved(k, problem, None if first else guess)
         pose = s.pose
         if not first:
-            pose = _integrated(pose, (s.xi + xi) / 2, self.dt)
+            pose = integrated_pose(pose, (s.xi + xi) / 2, self.dt)
         v = self._velocities(problem.sides.elements, xi)
         states = tuple(
             self._state_after(e, is_compiled, problem, site, state, v)
@@ -586,7 +304,7 @@ class Stepping:
     def _after_cycle(self, s: State, problem: Problem, site: Site) -> State:
         """Return the state at the end of a cycle with a new record of cycles,
         extrapolated if cycles are to repeat."""
-        displacement = _relative_pose(s.cycles.pose, self.next_pose(s))
+        displacement = relative_pose(s.cycles.pose, self.next_pose(s))
         if not self.heavy:
             cycles = limit_cycle.after_massless_cycle(s.cycles, displacement)
             return s._replace(cycles=cycles)
@@ -654,3 +372,21 @@ class Stepping:
 def _phase_after_phase(x: np.ndarray) -> np.ndarray:
     """Return values (N, joints, B) as those of N B samples, (joints, N B)."""
     return np.moveaxis(x, 0, 1).reshape(x.shape[1], -1)
+
+
+def relative_pose(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return pose b (3, B) in the frame at pose a."""
+    z = ((b[0] - a[0]) + 1j * (b[1] - a[1])) * np.exp(-1j * a[2])
+    return np.stack([z.real, z.imag, b[2] - a[2]])
+
+
+def integrated_pose(pose: np.ndarray, xi: np.ndarray, dt: float) -> np.ndarray:
+    """Return the pose (3, B) reached from a pose at a constant body velocity xi (3, B)
+    after dt."""
+    moved = dt * xi
+    half = 0.5 * moved[2]
+    chord = np.sin(half + TINY) / (half + TINY)  # over the arc
+    z = chord * np.exp(1j * (pose[2] + half)) * (moved[0] + 1j * moved[1])
+    moved[0] = z.real
+    moved[1] = z.imag
+    return pose + moved
