@@ -17,6 +17,7 @@ from rft.laws.base import (
     TermLaw,
     TermNumbers,
     has_only_drags,
+    is_frozen,
     is_mirror,
     speed_exponent,
     term_numbers,
@@ -99,7 +100,7 @@ def batched_medium(media: Sequence, counts: Sequence[int]) -> Any:
     >>> bool(abs(solution.xi[2] - alone.xi).max() < 1e-12)
     True
     """
-    if all(medium is media[0] for medium in media):
+    if all(_is_same(medium, media[0]) for medium in media):
         return media[0]
     forms = {batch_form(medium) for medium in media}
     if len(forms) > 1 or None in forms:
@@ -112,6 +113,11 @@ def batched_medium(media: Sequence, counts: Sequence[int]) -> Any:
     of_media = (np.stack(arrays, -1) for arrays in zip(*numbers))
     of_samples = TermNumbers(*(x[..., index] for x in of_media))
     return MediumBatch(index, tuple(media), of_samples)
+
+
+def _is_same(a: Any, b: Any) -> bool:
+    """Return whether two media are one, or immutable and equal."""
+    return a is b or (type(a) is type(b) and is_frozen(a) and a == b)
 
 
 def for_samples(medium: Any, function: Callable[[Any], Any]) -> np.ndarray:
