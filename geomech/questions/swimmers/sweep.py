@@ -2,7 +2,7 @@
 scene."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
@@ -36,6 +36,14 @@ class Sweep(Question):
             repeated=True,
         ),
     ]
+    best: Annotated[
+        str | None,
+        Option(
+            "also find the point with the largest net_distance or speed, between the "
+            "points of the grid",
+            "NAME",
+        ),
+    ] = None
     # A file of finished batches, from which the same sweep resumes; a command has its
     # own.
     partial: Path | None = field(default=None, kw_only=True, compare=False)
@@ -51,6 +59,10 @@ class Sweep(Question):
         return Plan(self.scene, self.over)
 
     def check(self) -> None:
+        if self.best is not None:
+            from geomech.studies.displacement.best import check_best
+
+            check_best(self.best, self.over)
         _ = self.plan.grid  # refuses points that make no scene
 
     def check_draw(self, data: Any = None) -> None:
@@ -86,7 +98,18 @@ class Sweep(Question):
         if "cost" in vars(self.plan):  # a command has asked for it
             seconds = self.plan.cost.seconds
         with store_batches(self.partial, self.scene):
-            return self.plan.result(run.progress, seconds)
+            result = self.plan.result(run.progress, seconds)
+            if self.best is None:
+                return result
+            return self._with_best(result, self.best, run)
+
+    def _with_best(self, result: Result, name: str, run: Run) -> Result:
+        """Return the sweep with its point that has the largest value of a variable."""
+        from geomech.studies.displacement.best import best_variables, find_best
+
+        best = find_best(self.scene, self.over, result, name, run.progress)
+        more = best_variables(best, result, name)
+        return replace(result, variables=(*result.variables, *more))
 
     @staticmethod
     def headline(result: Result) -> list[str]:
@@ -99,7 +122,8 @@ class Sweep(Question):
 
     @staticmethod
     def summary(result: Result) -> Result:
-        return result.only(*SHOWN)
+        best = [name for name in result if name.startswith("best_")]
+        return result.only(*best, *SHOWN)
 
     @staticmethod
     def draw(

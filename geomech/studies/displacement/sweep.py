@@ -110,9 +110,14 @@ def _axes(over: Mapping[str, list[float]]) -> list[Variable]:
     """Return the values of the parameters as coordinates, such as gait_amplitude."""
     axes = []
     for parameter, values in over.items():
-        name = parameter.replace(".", "_").replace("-", "_")
+        name = axis_name(parameter)
         axes.append(Variable(name, (name,), np.array(values, float), "", parameter))
     return axes
+
+
+def axis_name(parameter: str) -> str:
+    """Return the name of a parameter's coordinate."""
+    return parameter.replace(".", "_").replace("-", "_")
 
 
 def batches(question: BatchedQuestion, grid: Grid) -> Iterator[tuple]:
