@@ -269,7 +269,10 @@ def ccf_map(
     if legend and handles:
         ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.2))
     for gait in gaits:
-        draw_gait(gait, ax, within=field.axes)
+        line = getattr(gait, "line", "-")
+        colour = getattr(gait, "colour", "black")
+        draw_gait(gait, ax, colour, within=field.axes, line=line)
+    _label_loops(ax, gaits)
     if not all(is_inside(gait.shape(PHASES), field.axes).all() for gait in gaits):
         _note_gait_outside(ax)
 
@@ -297,6 +300,25 @@ def draw_colours(
         shading=shading,
         rasterized=True,
     )
+
+
+def _label_loops(ax: Axes, gaits: Sequence[Any]) -> None:
+    """Write beside the end of a lower corner which line is which, where loops have
+    names."""
+    names = [gait for gait in gaits if hasattr(gait, "label")]
+    box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
+    strokes = {"-": "solid", "--": "dashed"}
+    text = ", ".join(f"{strokes[gait.line]}: {gait.label}" for gait in names)
+    if text:
+        ax.text(
+            0.98,
+            0.02,
+            text,
+            transform=ax.transAxes,
+            fontsize=font_points(7),
+            ha="right",
+            bbox=box,
+        )
 
 
 def _note_gait_outside(ax: Axes) -> None:

@@ -21,7 +21,7 @@ from geomech.plots.maps import (
     shape_space,
 )
 from geomech.plots.style import blank, columns_that_fit, figure, quantity, styled
-from geomech.results.fields import field_of
+from geomech.results.fields import field_of, loops_of
 from geomech.results.lengths import shown_lengths
 from geomech.results.scenes import scene_of
 from geomech.studies.displacement.variables import poses
@@ -50,10 +50,12 @@ Update = Callable[[int], tuple]
 class ShownMotion(Motion):
     """A motion whose lengths are in the unit of a picture.
 
-    factor: of that unit to the scene's."""
+    factor: of that unit to the scene's. loops: curves in shape space to draw, gaits or
+    `geomech.results.fields.Loop`."""
 
-    unit: str
-    factor: float
+    unit: str = "BL"
+    factor: float = 1.0
+    loops: tuple = ()
 
     @property
     def size(self) -> float:
@@ -180,14 +182,15 @@ def _draw_ccf(ax: Axes, motion: ShownMotion, field: Field, error: Field | None) 
     """Draw the map of the CCF with the gait on it."""
     present = [k for k in range(3) if has_component(field, k)]
     component = present[0] if present else 0
-    gait = motion.scene.gait
     labels = shape_labels(motion.scene.system)
-    ccf_map(field, component, [gait], ax=ax, error=error, labels=labels)
+    ccf_map(field, component, motion.loops, ax=ax, error=error, labels=labels)
 
 
 def _draw_plane(ax: Axes, motion: ShownMotion) -> None:
     """Draw the gait on the bare plane of two shape variables."""
-    draw_gait(motion.scene.gait, ax)
+    for loop in motion.loops:
+        line = getattr(loop, "line", "-")
+        draw_gait(loop, ax, getattr(loop, "colour", "black"), line=line)
     low = motion.alpha.min(0)
     high = motion.alpha.max(0)
     margin = 0.15 * max(high - low) + 1e-9
@@ -249,7 +252,16 @@ def motion_of(result: Result) -> ShownMotion:
     frequency = result.attributes.get("frequency")
     unit, factor = shown_lengths(result)
     phase = result["phase"].values
-    return ShownMotion(scene, phase, alpha, poses(result), frequency, unit, factor)
+    return ShownMotion(
+        scene,
+        phase,
+        alpha,
+        poses(result),
+        frequency,
+        unit=unit,
+        factor=factor,
+        loops=tuple(loops_of(result, scene.gait)),
+    )
 
 
 def ccf_of(result: Result) -> tuple[Field | None, Field | None]:

@@ -32,6 +32,50 @@ class Slice:
         return [k for k in range(1, len(self.at) + 1) if k not in self.pair]
 
 
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """A closed curve in shape space as a result has it, to be drawn.
+
+    points: (N, joints), rad. label: for a legend. line, colour: its style."""
+
+    points: np.ndarray
+    label: str
+    line: str = "-"
+    colour: str = "black"
+
+    def shape(self, t: np.ndarray) -> np.ndarray:
+        """Return shapes (T, joints) at phases t (T,), rad, on straight lines between
+        the points."""
+        closed = np.concatenate([self.points, self.points[:1]])
+        phases = np.linspace(0.0, 2 * np.pi, len(closed))
+        columns = [np.interp(t, phases, column) for column in closed.T]
+        return np.stack(columns, -1)
+
+
+def _columns(result: Result, names: Sequence[str]) -> np.ndarray:
+    """Return variables (N,) as the columns of an array."""
+    return np.stack([result[name].values for name in names], -1)
+
+
+def loops_of(result: Result, gait: Any) -> list:
+    """Return what is drawn of a gait: the gait itself, or, where joints give way, the
+    loop that the shape makes and, dashed, the command."""
+    names = [name for name in result if name.startswith("loop_alpha")]
+    names = names or [name for name in result if name.startswith("command_alpha")]
+    if not names:
+        return [gait]
+    if names[0].startswith("loop"):
+        points = _columns(result, names)
+        commands = [name.replace("loop_", "loop_command_") for name in names]
+        command = _columns(result, commands)
+    else:
+        is_first = result["phase"].values < 2 * np.pi - 1e-9
+        command = _columns(result, names)[is_first]
+        own = [name.removeprefix("command_") for name in names]
+        points = _columns(result, own)[is_first]
+    return [Loop(points, "shape"), Loop(command, "command", "--", "0.35")]
+
+
 def length_unit(variable: Variable) -> str:
     """Return the unit of lengths in the unit of a variable over components."""
     return variable.unit[0].partition("/")[0]

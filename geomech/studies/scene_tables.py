@@ -37,6 +37,7 @@ from geomech.scenes.model import Scene, frequency_of
 from geomech.studies.available import available_tiers, default_tiers
 from geomech.studies.displacement.variables import displacement_result, timing_variables
 from geomech.studies.estimates import cost, effort, estimate, uncertainty
+from geomech.studies.realised import RealisedGait, realised
 from rft.core.checks import real_array
 from rft.core.refusal import Refusal, located
 
@@ -150,7 +151,27 @@ class SceneTables:
             return self._plan(chosen, self._gait(gait), amplitudes)
 
     def _plan(self, tier: Tier, gait: Gait, amplitudes) -> Plan:
-        return tier.plan(self.scene.system, self.scene.numerics, gait, amplitudes)
+        scene = self.scene
+        if tier.rests_on:  # what integrates a connection does so along the true loop
+            gait = self._realised(gait)
+        return tier.plan(scene.system, scene.numerics, gait, amplitudes)
+
+    def realised(self, gait: Gait | None = None) -> Gait | RealisedGait:
+        """Return the loop that the shape really makes under a gait, or the scene's own:
+        the gait itself unless joints give way. It is computed when it is first asked
+        for its shapes, once for each amplitude."""
+        return self._realised(self._gait(gait))
+
+    def _realised(self, gait: Gait) -> Any:
+        scene = self.scene
+        loop = realised(scene.system, gait, scene.numerics.phases)
+        if loop is gait:
+            return gait
+        key = ("realised loop", scene.system, (gait, scene.numerics.phases))
+        try:
+            return self._tables.setdefault(key, loop)
+        except TypeError:  # a gait that cannot be hashed
+            return loop
 
     def _gait(self, gait: Gait | None) -> Gait:
         """Return the gait given, checked, or the scene's own."""

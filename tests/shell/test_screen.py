@@ -45,10 +45,10 @@ SHOWN = [
     (show.aligned, (["a", "bcd"],), ["  a", "bcd"]),
     (show.joined, ([["a", "bcd"], ["ef", "g"]],), ["  a ef", "bcd  g"]),
     (show.width, ([["abc"], ["de"]],), 7),
-    (lengths.unit_with, ("m/s", "m", "cm"), "cm/s"),
-    (lengths.unit_with, ("m/rad2", "m", "BL"), "BL/rad2"),
-    (lengths.unit_with, ("mm", "m", "cm"), "mm"),
-    (lengths.unit_with, ("rad/s", "m", "cm"), "rad/s"),
+    (lengths.unit_with, ("m/s", "m", "cm"), ("cm/s", 1)),
+    (lengths.unit_with, ("m/rad2", "m", "BL"), ("BL/rad2", 1)),
+    (lengths.unit_with, ("mm", "m", "cm"), ("mm", 0)),
+    (lengths.unit_with, ("rad/s", "m", "cm"), ("rad/s", 0)),
 ]
 
 

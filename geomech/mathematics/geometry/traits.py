@@ -48,6 +48,8 @@ class Traits:
     labels : (name, unit) of each shape variable; alpha_1, alpha_2 ... in rad if left
         out.
     frequency : cycles per second, where xi depends on it.
+    compliant : joints give way, so that the shape is not that of the gait. The velocity
+        is that of the shape which the body really takes; a run finds both.
     """
 
     linear: bool = False
@@ -64,6 +66,7 @@ class Traits:
     unit: str = ""
     labels: tuple[tuple[str, str], ...] = ()
     frequency: float | None = None
+    compliant: bool = False
 
     @property
     def halved(self) -> bool:
@@ -74,8 +77,8 @@ class Traits:
     @property
     def steps(self) -> bool:
         """Whether a cycle is run phase after phase, as no velocity follows from shape
-        alone."""
-        return bool(self.lacks & SHAPE_ALONE)
+        alone, or no shape from the phase."""
+        return self.compliant or bool(self.lacks & SHAPE_ALONE)
 
 
 NOTHING = Traits()

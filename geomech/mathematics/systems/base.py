@@ -31,7 +31,9 @@ class Cycle(NamedTuple):
     |alphadot|, 1. work: power, internal moments and slip, (..., N) each
     (`rft.work_done`), or None. cycles: number that time stepping took, 1 without it.
     to_come: (...), change of displacement still to come where cycles go on until they
-    repeat, body lengths or rad; 0 elsewhere.
+    repeat, body lengths or rad; 0 elsewhere. springs: the shape that joints take which
+    give way, (..., N, d), and their torques (`rft.motion.compliance.SpringMotion`), or
+    None.
 
     Examples
     --------
@@ -49,6 +51,7 @@ class Cycle(NamedTuple):
     work: Any
     cycles: int
     to_come: np.ndarray
+    springs: Any = None
 
     def __repr__(self) -> str:
         count = np.size(self.speed)

@@ -157,6 +157,25 @@ class Stepped(Protocol):
         cycle (N, d) repeated ``cycles`` times."""
 
 
+@runtime_checkable
+class Compliant(Protocol):
+    """Joints that give way, so that a gait is only a command; read by
+    `geomech.studies.realised`.
+
+    prescribed: the system with its joints held at the gait."""
+
+    prescribed: System
+
+    def commanded(self, alpha) -> np.ndarray:
+        """Return shapes (..., d) of a gait with passive joints at rest."""
+
+    def time_steps(
+        self, alpha, alphadot, cycles, work=False, path=False, start=None
+    ) -> Any:
+        """Return the `rft.TimeSteps` of gaits (..., N, d) from shapes (..., d) one step
+        before the first phase."""
+
+
 class BalanceSize(NamedTuple):
     """The size of the balance of forces of one velocity; the defaults are for a system
     that solves none.

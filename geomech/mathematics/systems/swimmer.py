@@ -23,6 +23,7 @@ from geomech.mathematics.geometry.traits import MEAN, Traits
 from geomech.mathematics.systems.base import SYSTEMS, Cycle, System, refuse_mutable
 from geomech.mathematics.systems.capabilities import (
     BalanceSize,
+    Compliant,
     Diagnosed,
     Drawable,
     Part,
@@ -67,6 +68,7 @@ from rft.motion.stepping import Row, State, Stepping
 
 PARTS = {"medium": LAWS, "body": BODIES, "effects": EFFECTS}  # of a scene's tables
 RATES = Premise.RATE_INDEPENDENT
+SHAPE = Premise.PRESCRIBED_SHAPE
 # By the names that a scene may give.
 MEDIA = {name: entry.medium for name, entry in CATALOGUE.items()}
 # Radii of end caps over the shortest link (assumed), and over a continuous body.
@@ -127,6 +129,7 @@ class Swimmer:
                 own = effect.in_body_lengths(self.body.length)
                 for medium in members(self.medium):
                     own.check(medium)
+                    own.check_body(self.body, medium)
 
     def in_medium(self, medium: rft.Medium) -> Swimmer:
         """Return the swimmer in another medium, which alone is checked."""
@@ -153,7 +156,7 @@ class Swimmer:
         known (name, value)."""
         values = [*known]
         for effect in self.effects:
-            if hasattr(effect, quantity):
+            if getattr(effect, quantity, None) is not None:
                 values.append((effect.kind, getattr(effect, quantity)))
         for name, value in values[1:]:
             first_name, first_value = values[0]
@@ -186,12 +189,16 @@ class Swimmer:
         effects = self.effects
         is_central = is_odd(medium)
         lacks = rft.effects.broken_premises(effects)
+        is_compliant = bool(lacks & SHAPE)
+        lacks &= ~SHAPE
         if not is_rate_independent(medium):
             lacks |= RATES
         power_degree = None
         if not lacks & RATES:
             power_degree = speed_exponent(medium) + 1.0
-        frequencies = [e.frequency for e in effects if hasattr(e, "frequency")]
+        frequencies = [
+            e.frequency for e in effects if getattr(e, "frequency", None) is not None
+        ]
         return Traits(
             linear=is_linear(medium) and not effects,
             odd=is_central and all(e.odd for e in effects),
@@ -204,6 +211,7 @@ class Swimmer:
             frame=getattr(body, "frame", MEAN),
             labels=getattr(body, "shape_labels", ()),
             frequency=frequencies[0] if frequencies else None,
+            compliant=is_compliant,
         )
 
     def capability(self, kind: type) -> Any:
@@ -218,6 +226,8 @@ class Swimmer:
             return None
         if kind is Stepped:
             return _RepeatedCycles(self) if self.traits.steps else None
+        if kind is Compliant:
+            return self if self.traits.compliant else None
         if kind in (Diagnosed, Recorded, Symbolic):
             return _Facts(self)
         return self if isinstance(self, kind) else None
@@ -261,6 +271,17 @@ class Swimmer:
         body = dataclasses.replace(self.body, frame=frame)
         return dataclasses.replace(self, body=body)
 
+    def commanded(self, alpha: ArrayLike) -> np.ndarray:
+        """Return shapes (..., d) of a gait with the joints that no actuator moves at
+        rest."""
+        alpha = np.array(alpha, float)
+        for effect in self.effects:
+            if isinstance(effect, rft.Springs):
+                springs = effect.of_body(self.body, members(self.medium)[0])
+                passive = np.flatnonzero(springs.actuated[:, 0] == 0)
+                alpha[..., passive] = springs.rest[passive, 0]
+        return alpha
+
     def _settings(self, *names: str) -> dict:
         """Return the effects and settings of the solver, as arguments of rft's
         functions."""
@@ -289,8 +310,16 @@ class Swimmer:
             SHAPE_ALONE,
             "run a whole gait with the direct tier",
         )
-        settings = self._settings("tolerance", "backend")
+        settings = self.prescribed._settings("tolerance", "backend")
         return rft.BodyVelocity(self.medium, self.body, **settings)
+
+    @cached_property
+    def prescribed(self) -> Swimmer:
+        """The swimmer with its joints held at the gait; itself where they are."""
+        rigid = tuple(e for e in self.effects if not e.breaks & SHAPE)
+        if len(rigid) == len(self.effects):
+            return self
+        return dataclasses.replace(self, effects=rigid)
 
     def velocity(
         self, alpha: ArrayLike, alphadot: ArrayLike, start: ArrayLike | None = None
@@ -342,10 +371,13 @@ class Swimmer:
         cycles: int | None,
         work: bool = False,
         path: bool = False,
+        start: ArrayLike | None = None,
     ) -> rft.TimeSteps:
         """Return the gait computed phase after phase (`rft.time_steps`), without
-        checking convergence."""
+        checking convergence. start: shape of joints that give way before it."""
         context = (Swimmer.time_steps, self, alpha, alphadot, cycles is None)
+        if start is not None:
+            context = (*context, np.asarray(start, float))
 
         def advance(
             stepping: Stepping, state: State, count: int, with_work: bool
@@ -362,6 +394,7 @@ class Swimmer:
             cycles=cycles,
             with_work=work,
             with_path=path,
+            start=start,
             **self._settings("tolerance", "backend"),
         )
 
@@ -398,6 +431,7 @@ class Swimmer:
             work=steps.work,
             cycles=steps.cycles,
             to_come=to_come,
+            springs=steps.springs,
         )
 
     def _run_phases(self, alpha, alphadot, work: bool, start, speed) -> Cycle:

@@ -159,6 +159,7 @@ class Ccf(Question):
         ]
         if space.enclosed is not None:
             found += shape_space.enclosed_area(space.enclosed)
+            found += shape_space.loop_variables(tables)
         if self.metric:
             found += fields.metric_variables(tables.metric)
         if space.stretch is not None:
@@ -220,7 +221,13 @@ class Ccf(Question):
         On Axes that are given draw one component, x by default; return the Axes."""
         from geomech import plots
         from geomech.mathematics.systems.base import shape_labels
-        from geomech.results.fields import field_of, metric_of, slices_of, stretch_of
+        from geomech.results.fields import (
+            field_of,
+            loops_of,
+            metric_of,
+            slices_of,
+            stretch_of,
+        )
         from geomech.results.scenes import scene_of
 
         if stretch and "stretched_shape" not in result:
@@ -246,18 +253,19 @@ class Ccf(Question):
                 planes, scene.gait, style=style, names=both, **options
             )
         ccf, error = field_of(result, "ccf")
+        gaits = loops_of(result, scene.gait)
         if ax is not None:
             number = tools.component_number(component)
             return plots.ccf_map(
                 ccf,
                 number,
-                [scene.gait],
+                gaits,
                 ax=ax,
                 labels=labels,
                 error=error,
                 clim=clim,
             )
-        options.update(gaits=[scene.gait], error=error)
+        options.update(gaits=gaits, error=error)
         if stretch:
             unit = result["stretched_shape"].units
             plane = stretch_of(result)

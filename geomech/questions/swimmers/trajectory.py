@@ -110,7 +110,31 @@ class Trajectory(Question):
 
     @staticmethod
     def summary(result: Result) -> Result:
-        return result.only(*FINAL, "time", *POSE)
+        return result.only(*FINAL, "actuator_work", "time", *POSE)
+
+    @staticmethod
+    def remarks(result: Result) -> list[str]:
+        if "limit_cycle" not in result:
+            return []
+        lines = []
+        count = len(result["limit_cycle"].values)
+        if count > 1:
+            x = result["cycle_x"].values
+            lines.append(
+                f"from four starts the shape settles into {count} different cycles, "
+                f"with x from {x.min():.4g} to {x.max():.4g} {result['x'].units}; this "
+                "is the one from the command's shape"
+            )
+        unsettled = int(result["unsettled_starts"].values)
+        if unsettled:
+            lines.append(f"from {unsettled} of four starts no cycle is reached")
+        ambiguous = int(result["ambiguous_steps"].values)
+        if ambiguous:
+            lines.append(
+                f"the balance of {ambiguous} steps has more solutions than the one "
+                "taken"
+            )
+        return lines
 
     @staticmethod
     def draw(result: Result, *, pictures: int = 6) -> Any:

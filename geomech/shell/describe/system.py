@@ -13,7 +13,7 @@ from geomech.mathematics.systems.base import System, WrappedSystem, kind_of
 from geomech.mathematics.systems.framed import NAME, Framed
 from geomech.mathematics.systems.swimmer import effect_sizes, name_in
 from rft.bodies import BODIES
-from rft.core.premise import SHAPE_ALONE, negation
+from rft.core.premise import PHASE_ALONE, negation
 from rft.core.refusal import formatted, in_line
 from rft.effects import EFFECTS, ENGINES
 from rft.effects import engine as engine_of
@@ -60,7 +60,7 @@ def engine(system: System) -> str:
         )
     reasons = []
     for effect in system.effects:
-        broken = effect.breaks & SHAPE_ALONE
+        broken = effect.breaks & PHASE_ALONE
         if broken:
             reasons.append(f"with {effect.kind} the scene is {negation(broken)}")
     name = engine_of(system.effects)

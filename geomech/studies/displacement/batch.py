@@ -46,7 +46,9 @@ def _in_common(scene: Scene) -> str:
     for effect in getattr(system, "effects", ()):
         fields = [field.name for field in dataclasses.fields(effect)]
         common = [getattr(effect, x) for x in fields if x not in effect.batched]
-        effects.append((type(effect), common))
+        batched = [getattr(effect, x) for x in effect.batched]
+        sizes = [x is None or np.shape(x) for x in batched]
+        effects.append((type(effect), common, sizes))
 
     model: object = system
     if isinstance(system, Swimmer):

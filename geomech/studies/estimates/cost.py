@@ -35,7 +35,7 @@ from geomech.mathematics.systems.capabilities import (
 from geomech.mathematics.systems.framed import Framed
 from geomech.mathematics.tiers import fitted, harmonic
 from geomech.mathematics.tiers.base import Plan, Table, solved_phases
-from geomech.runs.backend import prefer_backend
+from geomech.runs.backend import prefer_backend, preferred
 from geomech.runs.cost import BASE, Cost, assumed_seconds
 from geomech.scenes.model import Scene
 from geomech.studies.estimates import effort, estimate, uncertainty
@@ -47,6 +47,8 @@ SECONDS_PER_CLOSED_FORM = 1e-6
 SECONDS_PER_LOOKUP = 2.2e-7  # s for each look-up in a table; measured
 SECONDS_PER_NUMBER = 1.1e-9  # s for each number that a look-up sums; measured
 ASSUMED_CYCLES = 3  # until cycles repeat
+# Time of a step of joints that give way over that of a batch of balances; measured.
+COMPLIANT = {"numpy": 3.0, "built": 0.2, "numba": 0.2}
 # Copies of a gait's angles and velocities while they are solved and integrated.
 CYCLE_COPIES = 14
 TABLE_COPIES = 4  # of a table while it is built, interpolated and written
@@ -73,11 +75,14 @@ class Job(NamedTuple):
         end, or another."""
         system = self.scene.system
         points = balance_size(system).evaluations
+        batches = self.batches
+        if system.traits.compliant:
+            batches *= COMPLIANT[back_end or preferred()]
         return assumed_seconds(
             self.weight * self.count,
             points,
             system.traits.linear,
-            self.batches,
+            batches,
             back_end,
         )
 
@@ -158,10 +163,21 @@ def n_balances(plan: Plan, count: int, phases: int) -> int:
 
 def _lookup_jobs(scene: Scene, plan: Plan, count: int, phases: int) -> list[Job]:
     """Return the jobs of a tier besides its table."""
+    # The loop that the shape really makes is computed first.
+    jobs = loop_jobs(scene, scene.gait, count)
     if not plan.table:
-        return field_jobs(scene, plan.balances(count, phases), BASE)
+        return jobs + field_jobs(scene, plan.balances(count, phases), BASE)
     seconds_per_lookup = SECONDS_PER_LOOKUP + SECONDS_PER_NUMBER * plan.read
-    return [Job(scene, 0, 0, besides=seconds_per_lookup * count * phases)]
+    return [*jobs, Job(scene, 0, 0, besides=seconds_per_lookup * count * phases)]
+
+
+def loop_jobs(scene: Scene, gait: Gait, count: int) -> list[Job]:
+    """Return the jobs of the loops that joints which give way make under ``count``
+    amplitudes of a gait; none where the gait prescribes the shape."""
+    if not scene.system.traits.compliant:
+        return []
+    phases = scene.numerics.phases
+    return direct_jobs(scene, gait, count, phases, with_error=False)
 
 
 def field_jobs(scene: Scene, count: float, memory: float) -> list[Job]:

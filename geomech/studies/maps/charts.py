@@ -264,6 +264,12 @@ def refuse(scene: Scene) -> None:
                 instead="use 'geomech displacement'",
             )
         harmonic.HARMONIC.refuse(system)
+        if system.traits.compliant:
+            raise Refusal(
+                "a chart is of gaits that prescribe the shape",
+                because="with springs a gait is only a command",
+                instead="remove the effect springs, or use 'geomech ccf'",
+            )
         if capability(system, Drawable) is None:
             raise Refusal(
                 "this system has no body to draw", instead="use 'geomech ccf'"

@@ -17,6 +17,7 @@ from geomech.mathematics.geometry.representations.field import Field
 from geomech.mathematics.geometry.representations.plane import Plane
 from geomech.mathematics.geometry.stretch import Stretch
 from geomech.mathematics.geometry.stretch import stretch as stretch_to_metric
+from geomech.mathematics.systems.base import shape_labels
 from geomech.mathematics.systems.capabilities import stored_table
 from geomech.mathematics.tiers.area import AREA
 from geomech.mathematics.tiers.fitted import finest_grid, refuse
@@ -38,6 +39,7 @@ from geomech.studies.estimates.cost import (
 from geomech.studies.estimates.effort import shares_velocities, why_no_metric
 from geomech.studies.maps import fields
 from geomech.studies.maps.fields import WHOLE, has_matrix
+from geomech.studies.realised import commanded
 from geomech.studies.scene_tables import SceneTables, refuse_outside
 from rft.core.checks import is_whole, real_array
 from rft.core.refusal import Refusal, located
@@ -51,6 +53,7 @@ ROUNDING = 1e-12  # largest size of a component that is nothing but roundoff
 N_RAYS = 72  # directions from the gait's middle in which the zero line is looked for
 N_STEPS = 200  # places along each
 FIRST_STEP = 0.02  # place on a ray, of its length
+LOOP_PHASE = "loop_phase"  # dimension of the loop of joints that give way
 
 
 class ShapeSpace(NamedTuple):
@@ -387,6 +390,30 @@ def _sign_changes(
         has_changed = np.diff(np.sign(field(middle + rays)), axis=1) != 0
     has_zero_line = has_changed.any(1)
     return has_zero_line, steps[has_changed.argmax(1)[has_zero_line]]
+
+
+def loop_variables(study: SceneTables) -> list[Variable]:
+    """Return the loop that joints which give way really make under the scene's gait, a
+    variable over ``loop_phase`` for each shape variable; none where the gait prescribes
+    the shape."""
+    scene = study.scene
+    loop = study.realised()
+    if loop is scene.gait:
+        return []
+    alpha, _ = loop.cycle(scene.numerics.phases)
+    phase = 2 * np.pi * np.arange(len(alpha)) / len(alpha)
+    dims = (LOOP_PHASE,)
+    label = "phase of the gait, 2 pi per cycle"
+    found = [Variable(LOOP_PHASE, dims, phase, "rad", label)]
+    names = fields.angle_names(alpha.T)
+    for name, values, (words, unit) in zip(names, alpha.T, shape_labels(scene.system)):
+        label = f"{words} of the loop that the shape makes"
+        found.append(Variable(f"loop_{name}", dims, values, unit, label))
+    command, _ = scene.gait.cycle(len(alpha))
+    for name, values in zip(names, commanded(scene.system, command).T):
+        label = "command of the loop"
+        found.append(Variable(f"loop_command_{name}", dims, values, "rad", label))
+    return found
 
 
 def enclosed_area(area: Result) -> list[Variable]:

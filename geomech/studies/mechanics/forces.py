@@ -35,6 +35,7 @@ from geomech.studies.estimates.elements import (
 )
 from geomech.studies.mechanics.newtons import ForceUnit, Sizes, force_unit
 from geomech.studies.mechanics.undulation import activation_of_bends, bends, loaded
+from geomech.studies.realised import true_shape
 from rft.core.premise import Premise
 from rft.core.refusal import located
 
@@ -324,8 +325,12 @@ def forces(
     system without a body in a medium."""
     system = _subdivided(scene).system
     alpha, alphadot = scene.gait.cycle(scene.numerics.phases)
-    elements = system.elements(alpha, alphadot)
+    if system.traits.compliant:
+        # Of the true shape, which is that of the body as it is, cut or not.
+        alpha, alphadot = true_shape(scene.system.run(alpha, alphadot), alpha, alphadot)
+        system = system.prescribed
     run = system.run(alpha, alphadot, work=True)
+    elements = system.elements(alpha, alphadot)
     work = _in_axial_drags(run.work, system.axial_drag)
     length = 2 * elements.half[:, 0]
     points = np.cumsum(length)[:-1]

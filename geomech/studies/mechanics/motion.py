@@ -12,13 +12,20 @@ import numpy as np
 from geomech.core.variables import Result, Variable
 from geomech.mathematics.geometry.reconstruct import poses, repeated
 from geomech.mathematics.geometry.symmetry import zero_components
-from geomech.mathematics.systems.base import body_size, length_unit, shape_labels
+from geomech.mathematics.systems.base import (
+    Cycle,
+    body_size,
+    length_unit,
+    shape_labels,
+)
 from geomech.mathematics.systems.capabilities import (
+    Compliant,
     Drawable,
     Stepped,
     balance_size,
     capability,
     settling,
+    solver_of,
 )
 from geomech.mathematics.tiers.path import PATH
 from geomech.runs.cost import Cost
@@ -31,10 +38,13 @@ from geomech.studies.estimates.cost import (
     total_cost,
 )
 from geomech.studies.maps import fields
+from geomech.studies.realised import commanded, limit_cycles
 from geomech.studies.scene_tables import SceneTables
 from rft.core.checks import is_whole
-from rft.core.premise import Premise
+from rft.core.premise import SHAPE_ALONE, Premise
 from rft.core.refusal import Refusal, located
+from rft.effects.springs import joint_rows
+from rft.motion.compliance import SpringMotion
 
 MOST_CYCLES = 10_000
 # s to compute and write a number of a table; some two times the measured time.
@@ -43,6 +53,8 @@ COPIES = 4  # of a table, of its numbers or its poses, in memory at a time
 OVER = ("phase",)
 GRID = ("component", "shape_1", "shape_2")  # dimensions of the CCF beside a motion
 FINAL = tuple(f"final_{name}" for name in POSE)
+TORQUE = "axial drag x body length"  # unit of torques and energies of springs
+POWER = "axial drag x body length/rad"
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,13 +64,17 @@ class Motion:
 
     phase: (P,), rad, growing from cycle to cycle. alpha: (P, joints). pose: (P, 3), of
     the body frame in the frame at phase 0, on the ground, in the scene's unit and rad.
-    frequency: of the gait, Hz, or None."""
+    frequency: of the gait, Hz, or None. springs: what joints that give way do in one
+    cycle (`rft.motion.compliance.SpringMotion`), or None; alpha is then the shape that
+    the body really takes, and command (P, joints) that of the gait."""
 
     scene: Scene
     phase: np.ndarray
     alpha: np.ndarray
     pose: np.ndarray
     frequency: float | None
+    command: np.ndarray | None = None
+    springs: SpringMotion | None = None
 
     @property
     def cycles(self) -> int:
@@ -95,6 +111,8 @@ def answer(
     scene = tables.scene
     motion = compute_motion(scene, cycles)
     found = variables(motion)
+    if motion.springs is not None and solver_of(scene.system).cycles is None:
+        found += limit_cycle_variables(scene)
     facts = attributes(motion)
     if mapped and is_mapped(scene):
         tables.compute_field(progress)
@@ -138,8 +156,75 @@ def variables(motion: Motion) -> list[Variable]:
     for k, (name, values, (label, shape_unit)) in enumerate(shapes):
         if label == name:
             label = fields.joint_label(k)
+        if motion.springs is not None:
+            label = f"{label}, as it really is"
         found.append(Variable(name, OVER, values, shape_unit, label))
+    if motion.springs is not None and motion.command is not None:
+        found += spring_variables(motion, motion.springs, motion.command)
     return found + end_variables(motion.points(), unit)
+
+
+def spring_variables(
+    motion: Motion, springs: SpringMotion, command: np.ndarray
+) -> list[Variable]:
+    """Return the command, and the torques, power and energy of joints that give way, at
+    every phase, and the work of all actuators in a cycle."""
+    system = motion.scene.system
+    found = []
+    names = fields.angle_names(command.T)
+    for k, (name, values) in enumerate(zip(names, command.T)):
+        _, unit = shape_labels(system)[k]
+        label = f"command of {fields.joint_label(k)}"
+        found.append(Variable(f"command_{name}", OVER, values, unit, label))
+    phases = len(springs.stored)
+    rows = np.arange(len(motion.phase)) % phases
+    entries = (
+        ("torque", springs.torque, TORQUE, "torque of spring and damper on"),
+        ("actuator_torque", springs.actuator, TORQUE, "torque of the actuator of"),
+        ("actuator_power", springs.actuator_power, POWER, "actuator's power at"),
+    )
+    for k in range(springs.torque.shape[1]):
+        where = f"joint {k + 1}"
+        for name, values, unit, label in entries:
+            if np.isnan(values[:, k]).all():
+                continue
+            found.append(
+                Variable(
+                    f"{name}_{k + 1}",
+                    OVER,
+                    values[rows, k],
+                    unit,
+                    f"{label} {where}",
+                )
+            )
+    stored = springs.stored[rows]
+    found.append(Variable("stored", OVER, stored, TORQUE, "energy in all springs"))
+    work = springs.actuator_power.sum(-1).mean() * 2 * np.pi
+    if not np.isnan(work):
+        label = "work of all actuators, per cycle"
+        found.append(Variable("actuator_work", (), work, TORQUE, label))
+    label = "steps whose balance certainly has more solutions than the one taken"
+    count = float(springs.several)
+    found.append(Variable("ambiguous_steps", (), count, "1", label))
+    return found
+
+
+def limit_cycle_variables(scene: Scene) -> list[Variable]:
+    """Return the displacements of the different cycles that joints which give way
+    settle into from four starts, and the number of starts that reach none."""
+    with located(scene.name):
+        found = limit_cycles(scene.system, scene.gait, scene.numerics.phases)
+    dims = ("limit_cycle",)
+    unit = length_unit(scene.system)
+    count = np.arange(1.0, len(found.nets) + 1)
+    label = "different cycles reached from four starts, that of the motion first"
+    variables = [Variable("limit_cycle", dims, count, "1", label)]
+    for name, values, of_pose in zip(POSE, found.nets.T, (unit, unit, "rad")):
+        label = "displacement in each of the different cycles"
+        variables.append(Variable(f"cycle_{name}", dims, values, of_pose, label))
+    label = "starts of four from which no cycle is reached"
+    variables.append(Variable("unsettled_starts", (), found.unsettled, "1", label))
+    return variables
 
 
 def final_pose(motion: Motion) -> list[Variable]:
@@ -199,6 +284,8 @@ def compute_motion(scene: Scene, cycles: int = 1) -> Motion:
     with located(scene.name):
         alpha, alphadot = gait.cycle(phases)
         stepped = capability(scene.system, Stepped)
+        if scene.system.traits.compliant:
+            return _compliant_motion(scene, alpha, alphadot, int(cycles))
         if stepped is None:
             xi = scene.system.run(alpha, alphadot).xi
             pose = repeated(poses(xi), int(cycles))
@@ -207,6 +294,45 @@ def compute_motion(scene: Scene, cycles: int = 1) -> Motion:
     rows = np.arange(len(pose))
     phase = 2 * np.pi * rows / phases
     return Motion(scene, phase, alpha[rows % phases], pose, frequency_of(scene))
+
+
+def _compliant_motion(
+    scene: Scene, alpha: np.ndarray, alphadot: np.ndarray, cycles: int
+) -> Motion:
+    """Return the motion of a body with springs over cycles of its limit cycle."""
+    cycle = scene.system.run(alpha, alphadot)
+    pose = repeated(poses(cycle.xi), cycles)
+    rows = np.arange(len(pose))
+    phases = scene.numerics.phases
+    return Motion(
+        scene,
+        2 * np.pi * rows / phases,
+        cycle.springs.alpha[rows % phases],
+        pose,
+        frequency_of(scene),
+        commanded(scene.system, alpha)[rows % phases],
+        _with_prescribed_joints(scene, cycle),
+    )
+
+
+def _with_prescribed_joints(scene: Scene, cycle: Cycle) -> SpringMotion:
+    """Return what joints do in a cycle with the torque and the power of the actuators
+    of prescribed joints: internal moments of the body. They stay nan with effects that
+    depend on place, past or mass."""
+    springs = cycle.springs
+    is_rigid = np.isnan(springs.actuator).all(0)
+    compliant = capability(scene.system, Compliant)
+    depends_on_more = bool(scene.system.traits.lacks & SHAPE_ALONE)
+    if compliant is None or depends_on_more or not is_rigid.any():
+        return springs
+    system: Any = compliant.prescribed
+    work = system.work(springs.alpha, springs.alphadot, cycle.xi)
+    moment = work.bending_moment / system.axial_drag
+    rate = springs.alphadot @ joint_rows(system.body).T
+    return springs._replace(
+        actuator=np.where(is_rigid, moment, springs.actuator),
+        actuator_power=np.where(is_rigid, moment * rate, springs.actuator_power),
+    )
 
 
 def frequency_of(scene: Scene) -> float | None:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from geomech.mathematics.gaits import Sine, Wave
 from geomech.mathematics.systems.base import body_size, kind_of
 from geomech.mathematics.systems.capabilities import Loaded, capability
+from geomech.studies.realised import true_shape
 from rft.core.checks import real_array
 from rft.core.refusal import Refusal
 
@@ -74,9 +75,12 @@ def performance(scene: Scene, amplitudes: ArrayLike) -> dict[str, np.ndarray]:
 
     alpha, alphadot = scene.gait.cycle(scene.numerics.phases, amplitudes)
     run = scene.system.run(alpha, alphadot, work=True)
+    alpha, alphadot = true_shape(run, alpha, alphadot)
     length = body_size(scene.system)
     progress = np.hypot(run.net[:, 0], run.net[:, 1]) / length
-    wave = _known_wave(scene, amplitudes)
+    wave = None
+    if run.springs is None:
+        wave = _known_wave(scene, amplitudes)
     if wave is None:
         wave = _bending_wave(system, alpha, alphadot)
     energy = 2 * np.pi * run.work.power.mean(-1) / length
@@ -373,6 +377,7 @@ def activation(scene: Scene) -> dict[str, np.ndarray | float]:
     system = loaded(scene, "activation")
     alpha, alphadot = scene.gait.cycle(scene.numerics.phases)
     run = scene.system.run(alpha, alphadot, work=True)
+    alpha, alphadot = true_shape(run, alpha, alphadot)
     return activation_of_bends(bends(system, alpha, alphadot), run.work.bending_moment)
 
 
