@@ -1,1 +1,1 @@
-"""Figures of swimmers: gaits, frames, trials and transients."""
+"""Figures of swimmers: gaits, frames, trials, transients and joints that give way."""

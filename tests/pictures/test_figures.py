@@ -23,7 +23,7 @@ from figures.paper import (
     fig11d_ccf,
     fig11e_displacement,
 )
-from figures.swimmers import frames_area
+from figures.swimmers import compliance, frames_area
 from geomech.scenes import load
 from geomech.studies.scene_tables import SceneTables
 
@@ -80,6 +80,13 @@ CURVES = [
         0,
         "area, link-2 frame",
         lambda found: np.hypot(*found["circle"]["link-2"]["area"][:, :2].T),
+    ),
+    (
+        compliance,
+        {"ratios": (0.5, 1.0), "slacks": (0.0, 0.3)},
+        2,
+        "$A$ = 1 rad",
+        lambda found: found["cable"]["x"][0],
     ),
 ]
 
