@@ -190,7 +190,8 @@ def test_a_fin_that_folds_freely_settles_where_it_meets_no_stop():
     assert right.max() < 1e-3
 
 
-CHECKED = json.loads((Path(__file__).parents[1] / "data/springs.json").read_text())
+DATA = Path(__file__).parents[1] / "data"
+CHECKED = json.loads((DATA / "springs.json").read_text())
 
 
 @compiled
@@ -217,6 +218,23 @@ def test_chains_in_loose_glass_move_as_an_integration_by_hand(case):
         nets.append(of_tail(steps.displacement, body, steps.springs.alpha[0]))
     error = max(1e-4, 2 * np.abs(nets[1] - nets[0]).max())
     np.testing.assert_allclose(nets[1], case["net"], atol=error)
+
+
+@compiled
+def test_a_worm_of_25_rods_bends_as_that_of_another_program():
+    """ElegansBot moves rods by springs and dampers whose angles of rest are a wave; its
+    joints also push their rods apart, which the springs here do not."""
+    theirs = json.loads((DATA / "elegansbot.json").read_text())
+    place = 2 * np.pi * 1.832 * np.linspace(0, 1, 24)
+    command = cosines(np.full(24, 0.7), -place, 100)
+    muscles = Springs(
+        stiffness=175000 / 3.2e6, damping=31250 / 3.2e6, frequency=1 / 1.6
+    )
+    steps = time_steps(Viscous(40.0), Chain((1,) * 25), *command, effects=[muscles])
+    difference = steps.springs.alpha[::5] - theirs["alpha"]
+    assert np.sqrt((difference**2).mean()) < 0.01
+    distance = np.hypot(*steps.checked().displacement[:2])
+    assert distance == pytest.approx(theirs["displacement"], rel=0.01)
 
 
 def of_tail(net, body, alpha):
