@@ -283,11 +283,11 @@ def test_the_map_of_a_sweep_lies_as_its_parameters(order):
 @pytest.mark.parametrize(
     ("more", "y", "label"),
     [
-        ({}, [1, -2], "net distance per cycle (m), backwards < 0"),
+        ({}, [1, -2], "net distance per cycle (m),\nbackwards < 0"),
         (
             {"frequency": np.array([3.0, 4.0]), "speed": np.array([3.0, 8.0])},
             [3, -8],
-            "speed (m/s), backwards < 0",
+            "speed (m/s),\nbackwards < 0",
         ),
     ],
 )

@@ -39,7 +39,14 @@ PARAMETER_UNITS = {
     "period": "s",
     "extent": "rad",
     "regularisation": "BL/rad",
+    "stiffness": "drag x BL/rad",
+    "damping": "drag x BL x s/rad",
+    "bending": "drag x BL$^2$",
+    "dead_band": "rad",
+    "rest": "rad",
 }
+# Of springs whose unit of torque is given.
+TORQUE_UNITS = {"stiffness": "N m/rad", "damping": "N m s/rad"}
 
 ESTIMATED = "with estimated error"  # label of a curve
 
@@ -185,7 +192,7 @@ def net_values(result: Result) -> tuple:
         spread = position_spread(result) * factor
     distance = distance * factor
     if (distance < 0).any():
-        label += ", backwards < 0"
+        label += ",\nbackwards < 0"
     return distance, net.error * factor, spread, label
 
 
@@ -252,11 +259,19 @@ def axis_labels(
             owner = name.split(".")[-2].replace("_", "-")
             text = f"{owner}: {last}"
         unit = units.get(last, "-")
+        effects = getattr(getattr(scene, "system", None), "effects", ())
+        if any(getattr(effect, "unit", None) is not None for effect in effects):
+            unit = TORQUE_UNITS.get(last, unit)
         if last.endswith("_deg"):
             unit = "deg"
             text = text.removesuffix("_deg")
-        labels.append(quantity(text.replace("gamma0", "gamma_0"), unit))
+        labels.append(quantity(_words(text), unit))
     return labels
+
+
+def _words(name: str) -> str:
+    """Return the name of a parameter as it is written in a label."""
+    return name.replace("gamma0", "gamma_0").replace("dead_band", "dead band")
 
 
 # Robots
