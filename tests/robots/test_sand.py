@@ -548,6 +548,18 @@ def test_a_heap_slides_to_the_angle_of_repose_wherever_it_is(place):
     assert memory.head[footprints.BOX + 1] == 0.0  # nothing slides any more
 
 
+def test_a_point_of_a_geom_moves_as_its_twist_says():
+    rng = np.random.default_rng(2)
+    twist = rng.normal(size=6)
+    arm = rng.normal(size=3)
+    expected = twist[3:] + np.cross(twist[:3], arm)
+    np.testing.assert_allclose(footprints.velocity_at(twist, arm), expected)
+    turn = Rotation.random(random_state=3).as_matrix()
+    place = rng.normal(size=3)
+    found = footprints.to_world(turn, place, arm)
+    np.testing.assert_allclose(found, place + turn @ arm)
+
+
 def test_bodies_that_a_model_has_bear_what_their_geoms_bear():
     model = model_of(BALL)
     data = mujoco.MjData(model)
@@ -618,6 +630,9 @@ def test_simulations_have_media_of_their_own(regions):
         sand.media[0] = media[2]
         whole = (media[2], OTHER) if regions else media[2]
         assert list(sand.media) == sand.media[:] == [whole, given[1]]
+        for number in (-3, 2, "first"):
+            with pytest.raises(rft.Refusal, match=str(number)):
+                sand.media[number] = media[0]
         batch.step(nstep=100)
         found = batch.bind("qpos").copy()
     other = dict.fromkeys(regions, media[0])
@@ -810,6 +825,8 @@ REFUSED = [
     ({"regions": {"x > 1": SPATIAL}}, "media of all regions must have the same form"),
     ({"regions": {"x > 1": "poppy-seeds-lose"}}, "did you mean poppy-seeds-loose"),
     ({"footprints": 0.01}, "footprints must be rft.mujoco.Footprints"),
+    ({"element": 0.9e-6}, "element"),
+    ({"element": 1001.0}, "element"),
     (PRINTS, 'need 8015 numbers of userdata, .* has 0: write <size nuserdata="8015"/>'),
 ]
 

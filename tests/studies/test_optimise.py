@@ -441,6 +441,13 @@ def test_a_start_that_brings_nothing(gait, objective):
     assert found.value > (0.1 if objective == "efficiency" else 0.008)
 
 
+def test_a_search_tells_how_far_it_is():
+    told = []
+    optimise(viscous(), harmonics=1, limits=1.2, starts=2, progress=told.append)
+    assert told == sorted(told)
+    assert 0.9 < told[-1] <= 1.0
+
+
 def test_starts_are_the_same_every_time_and_answers_are_counted():
     found = optimise(viscous(), harmonics=2, limits=1.4, starts=3)
     assert sum(count for _, count in found.answers) == 3 > len(found.answers)
