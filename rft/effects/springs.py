@@ -143,8 +143,8 @@ class Springs(Effect):
     order = 1
     cost = (
         "phases solved one after another, cycle after cycle, with the rates of the "
-        "joints among the unknowns: two to four times the balances of the same steps "
-        "without springs"
+        "joints among the unknowns: each phase takes 1.3 to 2.4 times the evaluations "
+        "of force that it takes without springs"
     )
     batched = ("stiffness", "bending", "damping", "frequency")
     memory_bounds = (-MOST_ANGLE, MOST_ANGLE)
