@@ -191,6 +191,11 @@ class Ccf(Question):
     @staticmethod
     def remarks(result: Result) -> list[str]:
         lines = []
+        if "loop_alpha_1" in result:
+            lines.append(
+                "alpha: the shape that the body takes; with springs a gait is only a "
+                "command"
+            )
         if "zero_line_share" in result:
             lines.append(zero_line_words(result))
         if "gait_amplitude" in result:

@@ -192,6 +192,8 @@ class Connection(Question):
             more += [v for v in slices if v.name not in dims]
             more += shape_space.connection_variables(space.planes)
         facts = {**found.attributes, **facts_of(tables)}
+        if self.scene.system.traits.compliant:
+            facts["shape"] = "taken"
         if self.contents:
             facts["contents"] = " ".join(self.contents)
         if space.other is not None:
@@ -236,6 +238,11 @@ class Connection(Question):
     def remarks(result: Result) -> list[str]:
         facts = result.attributes
         lines = [f"fit: {fit_words(result)}"]
+        if facts.get("shape") == "taken":
+            lines.append(
+                "alpha: the shape that the body takes; with springs a gait is only a "
+                "command"
+            )
         if "direction_share" in result:
             lines += direction_words(result["direction_share"].values)
         if facts.get("symmetries"):
