@@ -317,6 +317,9 @@ def test_a_run_from_python_fills_a_folder_as_the_command_does(tmp_path):
     run_geomech("run", "a.toml", "-o", "there", cwd=tmp_path)
     names = [{p.name for p in (tmp_path / x).iterdir()} for x in ("here", "there")]
     assert names[0] == names[1] and "displacement.json" in names[0]
+    geomech.run(scene).save(tmp_path / "turning", component=("theta",))
+    whole, part = (tmp_path / x / "ccf.png" for x in ("here", "turning"))
+    assert whole.read_bytes() != part.read_bytes()
     other = scene.with_numerics(grid=9)
     (tmp_path / "here" / "displacement.json").unlink()
     with pytest.raises(Refusal, match="it holds the results of another scene"):
