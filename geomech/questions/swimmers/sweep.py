@@ -62,7 +62,7 @@ class Sweep(Question):
         if self.best is not None:
             from geomech.studies.displacement.best import check_best
 
-            check_best(self.best, self.over)
+            check_best(self.scene, self.over, self.best)
         _ = self.plan.grid  # refuses points that make no scene
 
     def check_draw(self, data: Any = None) -> None:
@@ -89,7 +89,18 @@ class Sweep(Question):
         swept_points(data, parameter, units)  # refuses a file without points
 
     def cost(self) -> Cost:
-        return self.plan.cost
+        cost = self.plan.cost
+        if self.best is None:
+            return cost
+        from geomech.studies.displacement.best import n_points
+
+        times = 1 + n_points(self.over) / self.plan.grid.total
+        return cost._replace(
+            balances=round(times * cost.balances),
+            seconds=times * cost.seconds,
+            besides=times * cost.besides,
+            numpy_seconds=times * cost.numpy_seconds,
+        )
 
     def compute(self, run: Run) -> "Result":
         from geomech.studies.displacement.sweep import store_batches

@@ -19,6 +19,12 @@ ALONE = 7
 TOGETHER = 5
 
 
+def n_points(over: Mapping[str, Sequence[float]]) -> int:
+    """Return the number of points of all finer grids."""
+    count = ALONE if len(over) == 1 else TOGETHER
+    return ROUNDS * count ** len(over)
+
+
 class Best(NamedTuple):
     """The point with the largest value of a variable.
 
@@ -35,10 +41,18 @@ class Best(NamedTuple):
     at_edge: tuple[str, ...]
 
 
-def check_best(name: str, over: Mapping[str, Sequence[float]]) -> None:
-    """Refuse a grid without a point to either side of another."""
-    if name not in ("net_distance", "speed"):
-        raise Refusal("``best`` must be net_distance or speed", value=name)
+def check_best(scene: Any, over: Mapping[str, Sequence[float]], name: str) -> None:
+    """Refuse a variable that the sweep has not, and a grid without a point to either
+    side of another."""
+    has_robot = hasattr(scene, "robot")
+    known = ["speed"] if has_robot else ["net_distance", "speed"]
+    if name not in known:
+        raise Refusal(f"``best`` must be {' or '.join(known)}", value=name)
+    is_timed = any(parameter.endswith(".frequency") for parameter in over)
+    if name == "speed" and not has_robot and not is_timed and scene.frequency is None:
+        raise Refusal(
+            "the sweep has no speed", instead="give the gait a frequency for a speed"
+        )
     for parameter, values in over.items():
         if len(values) < 3:
             raise Refusal(
@@ -89,10 +103,6 @@ def _table(
     result: Result, over: Mapping[str, Sequence[float]], name: str
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the points (M, d), values and errors (M,) of a sweep."""
-    if name not in result:
-        raise Refusal(
-            f"the sweep has no {name}", instead="give the gait a frequency for a speed"
-        )
     axes = [np.asarray(values, float) for values in over.values()]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(axes))
     variable = result[name]
