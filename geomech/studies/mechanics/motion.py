@@ -25,7 +25,6 @@ from geomech.mathematics.systems.capabilities import (
     balance_size,
     capability,
     settling,
-    solver_of,
 )
 from geomech.mathematics.tiers.path import PATH
 from geomech.runs.cost import Cost
@@ -111,7 +110,7 @@ def answer(
     scene = tables.scene
     motion = compute_motion(scene, cycles)
     found = variables(motion)
-    if motion.springs is not None and solver_of(scene.system).cycles is None:
+    if motion.springs is not None and settling(scene.system) > 0:
         found += limit_cycle_variables(scene)
     facts = attributes(motion)
     if mapped and is_mapped(scene):
@@ -299,9 +298,20 @@ def compute_motion(scene: Scene, cycles: int = 1) -> Motion:
 def _compliant_motion(
     scene: Scene, alpha: np.ndarray, alphadot: np.ndarray, cycles: int
 ) -> Motion:
-    """Return the motion of a body with springs over cycles of its limit cycle."""
+    """Return the motion of a body with springs over cycles of its limit cycle; one
+    cycle where its place matters, as the shape then differs from cycle to cycle."""
     cycle = scene.system.run(alpha, alphadot)
-    pose = repeated(poses(cycle.xi), cycles)
+    stepped = capability(scene.system, Stepped)
+    if stepped is not None and scene.system.traits.lacks & Premise.SE2_SYMMETRIC:
+        if cycles > 1:
+            raise Refusal(
+                "with springs and an effect that depends on place no two cycles are "
+                "alike",
+                instead="request one cycle",
+            )
+        pose = stepped.path(alpha, alphadot, 1)
+    else:
+        pose = repeated(poses(cycle.xi), cycles)
     rows = np.arange(len(pose))
     phases = scene.numerics.phases
     return Motion(
