@@ -259,6 +259,12 @@ class Springs(Effect):
             instead="give every joint a finite stiffness",
         )
         require(
+            not (self.passive and is_mode),
+            "passive names single joints",
+            because="this body's shape variables are not the angles of single joints",
+            instead="use a chain without modes",
+        )
+        require(
             not (is_rigid & (actuated[:, 0] == 0)).any(),
             "a passive joint has infinite stiffness",
             instead="give it a finite stiffness, or shorten the chain by this joint",

@@ -349,6 +349,7 @@ def test_a_heavy_link_on_a_spring_swings_at_its_frequency():
         ({"bending": 1}, Chain(), Viscous(), "frequency"),
         ({"stiffness": 1}, Backbone(20), GLASS, "bending"),
         ({"stiffness": 0}, Chain(), GLASS, "driven"),
+        ({"bending": 1, "passive": 1}, Serpenoid(12), GLASS, "passive"),
         ({"stiffness": 1, "passive": (1, 2)}, Chain(), GLASS, "driven"),
         ({"stiffness": 1, "passive": 3}, Chain(), GLASS, "joint 3"),
         ({"stiffness": (math.inf, 1), "passive": 1}, Chain(), GLASS, "passive"),
