@@ -10,9 +10,10 @@ import geomech
 from geomech import scenes
 from geomech.core.variables import Result
 from geomech.mathematics.gaits import Circle
+from geomech.questions.swimmers.sweep import Sweep
 from geomech.studies.maps import charts
 from geomech.studies.realised import limit_cycles, realised
-from rft import Chain, Granular, Springs
+from rft import Chain, Granular, Slope, Springs
 from rft.core.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
@@ -32,6 +33,13 @@ def test_the_geometry_explains_a_tail_that_gives_way():
     assert x["path"] == pytest.approx(x["direct"], abs=1e-7)
     assert abs(x["area"] - x["direct"]) < error["area"] < 0.02 * abs(x["direct"])
     assert x["direct"] > 100 * error["direct"]
+
+
+def test_a_table_of_a_family_of_gaits_is_not_for_springs():
+    study = geomech.study(TAIL)
+    assert "adapted" not in study.tables.tiers
+    with pytest.raises(Refusal, match="adapted"):
+        study.displacement(0.5, "adapted")
 
 
 @compiled
@@ -56,6 +64,28 @@ def test_a_best_point_needs_points_to_either_side():
         geomech.sweep(TAIL, over=over, best="net_distance")
     with pytest.raises(Refusal, match="best"):
         geomech.sweep(TAIL, over=over, best="heading")
+
+
+def test_a_best_speed_needs_a_frequency_and_finer_grids_count():
+    cable = scenes.load("three-link-cable")
+    over = {"effects.springs.stiffness": [0.5, 1.0, 2.0]}
+    with pytest.raises(Refusal, match="frequency"):
+        geomech.sweep(cable, over=over, best="speed")
+    plain = Sweep(TAIL, over).cost()
+    assert Sweep(TAIL, over, "speed").cost().balances > 9 * plain.balances
+
+
+def test_on_a_slope_springs_move_as_far_as_the_run_says():
+    slope = Slope(angle=0.3)
+    scene = scenes.load("three-link-cable").with_numerics(phases=64)
+    scene = scene.changed(effects=(*scene.system.effects, slope))
+    motion = geomech.trajectory(scene)
+    assert "limit_cycle" not in motion
+    net = scene.system.run(*scene.gait.cycle(64)).net
+    found = [float(motion[f"final_{name}"].values) for name in ("x", "y", "heading")]
+    np.testing.assert_allclose(found, net, atol=1e-9)
+    with pytest.raises(Refusal, match="place"):
+        geomech.trajectory(scene, cycles=2)
 
 
 def test_one_limit_cycle_from_four_starts_where_drag_is_linear():

@@ -70,6 +70,7 @@ ADAPTED = Tier(
     {"color": "#CC79A7", "linestyle": (0, (5, 1))},
     _plan,
     rests_on=SHAPE_ALONE,
+    prescribed=True,
     result="adapted tier",
     common=False,  # its table serves one family of gaits
     settings=(

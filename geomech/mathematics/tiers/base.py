@@ -162,9 +162,9 @@ class Tier:
     plan(system, numerics, gait, amplitudes) returns the `Plan`. rests_on: premises
     without which no ``result`` exists. joints: numbers of shape variables that it
     takes, in words ``takes``, with ``instead`` for other bodies; offered: the numbers
-    for which it is chosen unless tiers are named. regular: there must be no singular
-    shapes. common: a plain study takes it. markers: their colour; if left out the
-    line's. settings: those that an error study sweeps.
+    for which it is chosen unless tiers are named. prescribed: joints must not give way.
+    regular: there must be no singular shapes. common: a plain study takes it. markers:
+    their colour; if left out the line's. settings: those that an error study sweeps.
 
     Examples
     --------
@@ -186,6 +186,7 @@ class Tier:
     takes: str = "needs a body with joints"
     instead: str = "use direct"
     regular: bool = False
+    prescribed: bool = False
     common: bool = True
     markers: str = ""
     settings: tuple[Setting, ...] = ()
@@ -203,6 +204,12 @@ class Tier:
     def refuse(self, system: System) -> None:
         """Refuse a system to which the tier does not apply."""
         refuse(system, self.result, self.rests_on, "use the direct tier")
+        if self.prescribed and system.traits.compliant:
+            raise Refusal(
+                f"the {self.name} tier has a table of gaits that prescribe the shape",
+                because="with springs a gait is only a command",
+                instead="use path, harmonic or direct",
+            )
         if system.joints not in self.joints:
             raise Refusal(
                 f"the {self.name} tier {self.takes}; this body has {system.joints}",
@@ -225,6 +232,8 @@ class Tier:
     def is_possible(self, system: System) -> bool:
         """Return whether the tier applies to this system."""
         if system.joints not in self.joints or system.traits.lacks & self.rests_on:
+            return False
+        if self.prescribed and system.traits.compliant:
             return False
         return not self.meets_singular_shapes(system)
 

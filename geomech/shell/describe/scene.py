@@ -139,6 +139,8 @@ def why_no_tier(tier: Any, system: System) -> str:
     """Return the reason why a tier does not apply to a system."""
     if system.traits.lacks & tier.rests_on:
         return missing_premises(system)
+    if tier.prescribed and system.traits.compliant:
+        return "with springs a gait does not prescribe the shape"
     if system.joints not in tier.joints:
         first = tier.joints[0]
         last = tier.joints[-1]
