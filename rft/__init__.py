@@ -11,6 +11,13 @@ if TYPE_CHECKING:
     from rft.balance.force import LinkForce, link_force
     from rft.balance.velocity import BodyVelocity, Solution, body_velocity
     from rft.bodies import Backbone, Body, Chain, ConstantCurvature, Serpenoid
+    from rft.contacts import (
+        FunctionContact,
+        LinkContact,
+        Touching,
+        WaveContact,
+        support_margin,
+    )
     from rft.core.refusal import Refusal
     from rft.effects import (
         BodyInertia,
@@ -35,6 +42,7 @@ _NAMES = {
     "rft.balance.force": "LinkForce link_force",
     "rft.balance.velocity": "BodyVelocity Solution body_velocity",
     "rft.bodies": "Backbone Body Chain ConstantCurvature Serpenoid",
+    "rft.contacts": "FunctionContact LinkContact Touching WaveContact support_margin",
     "rft.effects": "BodyInertia DepthProfile DisturbedGround EndCaps GrainInertia "
     "SkinFriction Slope Springs TowedSled Transient",
     "rft.laws": "CATALOGUE Coulomb Granular Medium Surface Table Viscous",
@@ -74,8 +82,10 @@ __all__ = [
     "DepthProfile",
     "DisturbedGround",
     "EndCaps",
+    "FunctionContact",
     "GrainInertia",
     "Granular",
+    "LinkContact",
     "LinkForce",
     "Medium",
     "Refusal",
@@ -87,12 +97,15 @@ __all__ = [
     "Surface",
     "Table",
     "TimeSteps",
+    "Touching",
     "TowedSled",
     "Transient",
     "Viscous",
+    "WaveContact",
     "Work",
     "body_velocity",
     "link_force",
+    "support_margin",
     "time_steps",
     "work_done",
 ]

@@ -15,9 +15,9 @@ from geomech.io.rows import read as read_rows
 from geomech.io.toml import tables_of
 from geomech.mathematics.systems.swimmer import MEDIA, PARTS
 from geomech.scenes.data.drag import ACROSS, ALONG, ANGLE, LARGEST_FILE
-from geomech.scenes.format.key import Word
 from geomech.scenes.format.reader import Source, read_section
 from geomech.scenes.format.sections import FromFile, OneOf
+from rft.core.checks import Word
 from rft.core.refusal import Refusal, located
 
 LARGEST = 1_000_000  # bytes of a medium's file

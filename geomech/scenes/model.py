@@ -42,6 +42,7 @@ SHORT = "swimmer"  # the kind of system whose sections may stand by themselves
 SWIMMER = {
     "medium": MEDIUM,
     "body": OneOf(PARTS["body"], sized=True),
+    "contact": OneOf(PARTS["contact"]),
     "effects": Each(PARTS["effects"], sized=True),
 }
 TABLE = {  # body and medium of a table whose file does not state them

@@ -237,7 +237,7 @@ def _shortened(tables: dict, scene: Scene) -> dict:
     system = tables.pop("system")
     effects = []
     if isinstance(_nameable(scene.system), Swimmer):
-        parts = {part: system[part] for part in SWIMMER if system[part]}
+        parts = {part: system[part] for part in SWIMMER if system.get(part)}
         tables = parts | tables
         effects = tables.get("effects", [])
     else:

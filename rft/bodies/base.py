@@ -216,10 +216,10 @@ class WrappedBody:
         return self.inner.joints
 
     def joint_angles(self, shape: np.ndarray) -> np.ndarray:
-        return _joint_angles(self.inner, shape)
+        return joint_angles(self.inner, shape)
 
 
-def _joint_angles(body: Body, shape: np.ndarray) -> np.ndarray:
+def joint_angles(body: Body, shape: np.ndarray) -> np.ndarray:
     """Return the joint angles of a shape whose variables are modes; else the shape
     variables themselves."""
     if hasattr(body, "joint_angles"):
@@ -230,7 +230,7 @@ def _joint_angles(body: Body, shape: np.ndarray) -> np.ndarray:
 def joint_speed(body: Body, alphadot: np.ndarray) -> np.ndarray:
     """Return the size (B,) of the joint rates at rates (joints, B) of the shape
     variables, by which velocities are scaled."""
-    rates = _joint_angles(body, alphadot)
+    rates = joint_angles(body, alphadot)
     return np.sqrt(np.add.reduce(rates * rates))
 
 

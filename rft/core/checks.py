@@ -13,6 +13,7 @@ import functools
 import math
 import numbers
 import sys
+from collections.abc import Collection
 from dataclasses import fields, is_dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeGuard, get_args, get_type_hints
 
@@ -34,6 +35,15 @@ class Number(NamedTuple):
     unit: str
     meaning: str
     whole: bool = False
+
+
+class Word(NamedTuple):
+    """The annotation of a field whose text is one of several choices.
+
+    meaning: as lists of keys print it."""
+
+    choices: Collection[str]
+    meaning: str
 
 
 @functools.cache

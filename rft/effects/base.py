@@ -95,6 +95,8 @@ class Effect:
         effect does.
     varies_along : whether the effect varies along an element; it then acts by its mean
         over each piece of an element.
+    knows_contact : whether the effect is right where parts of the body are lifted
+        (`rft.contacts`).
     odd : whether the loads that it adds change sign with all velocities (assumed, not
         proven).
     metres : fields in body lengths, and for each the field that gives it in metres, of
@@ -126,6 +128,7 @@ class Effect:
     memory_size = 0
     reads_place = True
     varies_along = odd = False
+    knows_contact = False
     metres: ClassVar[Mapping[str, InMetres]] = {}
     required = ()
     element_update: ClassVar[Callable[..., tuple] | None] = None

@@ -60,6 +60,7 @@ class BodyInertia(Effect):
     ]
 
     kind = "body-inertia"
+    knows_contact = True
     breaks = Premise.QUASI_STATIC | Premise.RATE_INDEPENDENT
     limit = "mass = 0"
     cost = (

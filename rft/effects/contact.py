@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from rft.bodies.base import Body, Elements, checked_body, joint_speed
 from rft.bodies.pieces import subdivide
 from rft.core.checks import in_range
+from rft.core.refusal import require
 from rft.formulas.link import Additions, Factor, Incline, Memory
 from rft.formulas.momentum import MomentumRate
 from rft.formulas.newton import Frame
@@ -244,11 +245,12 @@ class Assembly(NamedTuple):
     """A law, a subdivided body and effects: everything that does not depend on shapes
     and rates, built by `assemble`.
 
-    station, fraction: (n, 1), centres of the elements along the body and their
-    fractions of its length. buried: (n, 1), of `Contact`. no_points: an empty contact.
-    n_elements: number of elements and added points. n_law_points: number of points at
-    which the law is evaluated, elements times nodes of the rule. Other fields as in
-    `Problem`."""
+    touching: the body of which parts are lifted (`rft.contacts.Touching`), None where
+    all of it touches. station, fraction: (n, 1), centres of the elements along the body
+    and their fractions of its length. buried: (n, 1), of `Contact`. no_points: an empty
+    contact. n_elements: number of elements and added points. n_law_points: number of
+    points at which the law is evaluated, elements times nodes of the rule. Other fields
+    as in `Problem`."""
 
     medium: Any
     law: Any
@@ -257,6 +259,7 @@ class Assembly(NamedTuple):
     homogeneous: bool
     linear: bool
     body: Body
+    touching: Any
     effects: tuple
     station: np.ndarray
     fraction: np.ndarray
@@ -297,6 +300,11 @@ class Assembly(NamedTuple):
         mean = self.fraction.T
         frame = Frame(mean @ x, mean @ y, force_scale(self, speed), speed)
         sides = Contact(e, self.station, self.buried)
+        if self.touching is not None:
+            factor = self.touching.contact_factors(
+                alpha, e, self.station, self.fraction
+            )
+            sides = sides.with_factors(factor, factor, factor)
         return Problem(
             *self[:6],
             sides,
@@ -328,12 +336,22 @@ def _assembled(medium, body, effects, rule, pieces) -> Assembly:
         require_drag(each)
     checked_body(body)
     in_range("pieces", pieces, 1, MOST_PIECES, whole=True)
-    if any(effect.varies_along for effect in effects):
+    touching = body if hasattr(body, "contact_factors") else None
+    if varies_along(body, effects):
         body = subdivide(body, pieces)
     effects = tuple(effect.in_body_lengths(body.length) for effect in effects)
     for each in members(medium):
         for effect in effects:
             effect.check(each)
+    if touching is not None:
+        for effect in effects:
+            require(
+                effect.knows_contact,
+                f"{effect.kind} does not know parts of the body that are lifted",
+                because="it follows the ground, or the joints, under a body that "
+                "touches all along",
+                instead="remove the effect, or the contact that comes and goes",
+            )
     zero = np.zeros((body.joints, 1))
     e = body.motion(zero, zero)
     station = np.cumsum(2 * e.half, 0) - e.half
@@ -353,6 +371,7 @@ def _assembled(medium, body, effects, rule, pieces) -> Assembly:
     assembly = Assembly(
         *law_and_units,
         body,
+        touching,
         adding,
         station,
         fraction,
@@ -366,6 +385,14 @@ def _assembled(medium, body, effects, rule, pieces) -> Assembly:
     return assembly._replace(
         effects=ordered, n_elements=n_elements, n_law_points=n_law_points
     )
+
+
+def varies_along(body: Body, effects: Sequence) -> bool:
+    """Return whether loads vary along an element by effects, or by contact that comes
+    and goes, so that a balance takes the elements cut into pieces."""
+    contact = getattr(body, "contact", None)
+    is_cut = contact is not None and contact.is_cut
+    return is_cut or any(effect.varies_along for effect in effects)
 
 
 def _drags(medium) -> tuple:

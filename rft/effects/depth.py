@@ -61,6 +61,7 @@ class DepthProfile(Effect):
     ] = None
 
     kind = "depth-profile"
+    knows_contact = True
     metres = {"slope": InMetres("slope_per_m", -1)}
     odd = True
     limit = "along all 1 and slope = 0"

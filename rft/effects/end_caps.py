@@ -11,7 +11,7 @@ import numpy as np
 from rft.core.checks import Number, check_numbers, unmasked
 from rft.core.refusal import require
 from rft.effects.base import EFFECTS, Effect, InMetres
-from rft.effects.contact import Contact, Problem
+from rft.effects.contact import NO_FACTOR, Contact, Problem
 from rft.formulas.link import dry_point
 from rft.laws.batch import for_samples
 from rft.laws.granular import Granular
@@ -64,6 +64,7 @@ class EndCaps(Effect):
     ] = None
 
     kind = "end-caps"
+    knows_contact = True
     mixes_media = True
     metres = {"radius": InMetres("radius_m")}
     adds_points = odd = True
@@ -88,6 +89,10 @@ class EndCaps(Effect):
         ends = e.attached_points([0, -1], e.half[[0, -1]] * [[-1.0], [1.0]], weight)
         station = np.array([[0.0], [1.0]])
         points = Contact(ends, station, buried=np.ones((2, 1)))
+        if problem.sides.factor is not NO_FACTOR:
+            # Effects that add points act first: the factors are those of contact.
+            lifted = [x[[0, -1]] for x in problem.sides.factor]
+            points = points.with_factors(*lifted)
         terms = for_samples(problem.medium, self.terms)
         return problem.with_points(points, terms)
 

@@ -48,6 +48,7 @@ class SkinFriction(Effect):
     ] = 0.15
 
     kind = "skin-friction"
+    knows_contact = True
     mixes_media = True
     limit = "forward = backward = reference"
     cost = "one multiplication per element"

@@ -80,6 +80,7 @@ class Slope(Effect):
     ] = 0.0
 
     kind = "slope"
+    knows_contact = True
     breaks = Premise.SE2_SYMMETRIC
     limit = "angle = 0"
     cost = (

@@ -56,6 +56,7 @@ class TowedSled(Effect):
     ] = None
 
     kind = "towed-sled"
+    knows_contact = True
     mixes_media = True
     metres = {"distance": InMetres("distance_m")}
     adds_points = odd = True

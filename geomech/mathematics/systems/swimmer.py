@@ -44,11 +44,12 @@ from rft.bodies.base import (
     joint_speed,
 )
 from rft.bodies.pieces import PIECES, subdivide
+from rft.contacts import CONTACTS, ContactRule, Touching
 from rft.core.checks import unmasked
 from rft.core.premise import SHAPE_ALONE, Premise
 from rft.core.refusal import Refusal, located
 from rft.effects import EFFECTS
-from rft.effects.contact import assemble
+from rft.effects.contact import assemble, varies_along
 from rft.formulas import se2
 from rft.formulas.quadrature import QUADRATURE
 from rft.laws import (
@@ -66,7 +67,8 @@ from rft.laws.catalogue import DEPTH
 from rft.laws.records import record, rule_for
 from rft.motion.stepping import Row, State, Stepping
 
-PARTS = {"medium": LAWS, "body": BODIES, "effects": EFFECTS}  # of a scene's tables
+# Of a scene's tables.
+PARTS = {"medium": LAWS, "body": BODIES, "contact": CONTACTS, "effects": EFFECTS}
 RATES = Premise.RATE_INDEPENDENT
 SHAPE = Premise.PRESCRIBED_SHAPE
 # By the names that a scene may give.
@@ -81,7 +83,9 @@ SMALLEST_CAP_OF_BODY = 0.008
 class Swimmer:
     """A body in a medium, with effects.
 
-    solver: how the balance of forces is solved.
+    contact: which part of the body touches the ground when; None for all of it, always.
+    Where contact follows the phase, its phase is the last shape variable. solver: how
+    the balance of forces is solved.
 
     Examples
     --------
@@ -95,6 +99,7 @@ class Swimmer:
     medium: rft.Medium
     body: rft.Body
     effects: tuple[rft.effects.Effect, ...] = ()
+    contact: ContactRule | None = None
     solver: Solver = field(default=Solver())
 
     kind = "swimmer"
@@ -105,6 +110,8 @@ class Swimmer:
         rft.effects.broken_premises(self.effects)
         # Tables are stored by a hash, which a list has not.
         object.__setattr__(self, "effects", tuple(self.effects))
+        with located("[contact]"):
+            self.touching_body  # noqa: B018 (checks contact)
         if not isinstance(self.solver, Solver):
             raise Refusal("solver must be Solver(...)", value=self.solver)
         self._agree()
@@ -167,10 +174,17 @@ class Swimmer:
                     because="both belong to one swimmer",
                 )
 
+    @cached_property
+    def touching_body(self) -> rft.Body:
+        """The body with its contact; itself where all of it touches."""
+        if self.contact is None:
+            return self.body
+        return Touching(self.body, self.contact)
+
     @property
     def joints(self) -> int:
         """Number of shape variables."""
-        return self.body.joints
+        return self.touching_body.joints
 
     @property
     def length(self) -> float | None:
@@ -187,7 +201,10 @@ class Swimmer:
         medium = self.medium
         body = self.body
         effects = self.effects
+        lifted = self.contact is not None
         is_central = is_odd(medium)
+        is_reversed = is_central and is_reversible(body)
+        is_reversed = is_reversed and not effects and not lifted
         lacks = rft.effects.broken_premises(effects)
         is_compliant = bool(lacks & SHAPE)
         lacks &= ~SHAPE
@@ -202,14 +219,14 @@ class Swimmer:
         return Traits(
             linear=is_linear(medium) and not effects,
             odd=is_central and all(e.odd for e in effects),
-            mirror=is_mirror(medium) and is_symmetric(body),
-            reversible=not effects and is_central and is_reversible(body),
+            mirror=is_mirror(medium) and is_symmetric(body) and not lifted,
+            reversible=is_reversed,
             smooth=is_linear(medium),
             power_degree=power_degree,
             lacks=lacks,
             joint_angles=_has_joint_angles(body),
             frame=getattr(body, "frame", MEAN),
-            labels=getattr(body, "shape_labels", ()),
+            labels=getattr(self.touching_body, "shape_labels", ()),
             frequency=frequencies[0] if frequencies else None,
             compliant=is_compliant,
         )
@@ -218,7 +235,8 @@ class Swimmer:
         """Return the object with an ability, which depends on medium, body and
         effects."""
         if kind is Drawable:
-            return self.body if isinstance(self.body, Drawable) else None
+            body = self.touching_body
+            return body if isinstance(self.body, Drawable) else None
         if kind is Uncertain:
             has_names = hasattr(self.medium, "uncertain")
             if has_names and getattr(self.medium, "covariance", None) is not None:
@@ -247,9 +265,11 @@ class Swimmer:
         solver = self.solver
         effects = self.effects
         medium = members(self.medium)[0]  # whose size is that of the others
-        assembly = assemble(medium, self.body, effects, solver.loads, solver.pieces)
+        assembly = assemble(
+            medium, self.touching_body, effects, solver.loads, solver.pieces
+        )
         pieces = 0
-        if any(e.varies_along for e in effects):
+        if varies_along(self.touching_body, effects):
             # Elements that are shorter than a piece are not cut.
             elements = 0.5 / half_lengths(self.body).max()
             pieces = max(solver.pieces, int(np.ceil(elements - 1e-9)))
@@ -311,7 +331,7 @@ class Swimmer:
             "run a whole gait with the direct tier",
         )
         settings = self.prescribed._settings("tolerance", "backend")
-        return rft.BodyVelocity(self.medium, self.body, **settings)
+        return rft.BodyVelocity(self.medium, self.touching_body, **settings)
 
     @cached_property
     def prescribed(self) -> Swimmer:
@@ -337,13 +357,14 @@ class Swimmer:
         """Return power, internal moments and slip of a solution of `solve`; see
         `rft.work_done`."""
         return rft.work_done(
-            self.medium, self.body, alpha, alphadot, xi, **self._settings()
+            self.medium, self.touching_body, alpha, alphadot, xi, **self._settings()
         )
 
     def elements(self, alpha: ArrayLike, alphadot: ArrayLike) -> rft.bodies.Elements:
         """Return the elements (n, N) of the body at shapes and rates (N, d), in a fixed
         frame."""
-        return self.body.motion(unmasked("x", alpha).T, unmasked("x", alphadot).T)
+        alpha = unmasked("x", alpha)
+        return self.touching_body.motion(alpha.T, unmasked("x", alphadot).T)
 
     def subdivided(self) -> Swimmer:
         """Return the swimmer with its body cut into short elements."""
@@ -387,7 +408,7 @@ class Swimmer:
 
         return rft.time_steps(
             self.medium,
-            self.body,
+            self.touching_body,
             alpha,
             alphadot,
             advance=advance,
@@ -412,7 +433,9 @@ class Swimmer:
         RuntimeError if a force balance did not converge or cycles did not become
         periodic."""
         rates = alphadot.reshape(-1, self.joints).T
-        speed = joint_speed(self.body, rates).reshape(alphadot.shape[:-1]).mean(-1)
+        speed = (
+            joint_speed(self.touching_body, rates).reshape(alphadot.shape[:-1]).mean(-1)
+        )
         if not self.traits.steps:
             return self._run_phases(alpha, alphadot, work, start, speed)
 

@@ -14,22 +14,14 @@ import functools
 import inspect
 import json
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple, get_args, get_type_hints
 
 import msgspec
 
-from rft.core.checks import number_fields
+from rft.core.checks import Word, number_fields
 
 MARK = re.compile(r"(?<![\w`.])((?:[A-Za-z_]\w*, )*[A-Za-z_]\w*) \(([^()]*)\):\s+")
-
-
-class Word(NamedTuple):
-    """The annotation of a field whose text is one of several choices. meaning: for
-    lists of keys."""
-
-    choices: Collection[str]
-    meaning: str
 
 
 class Key(NamedTuple):

@@ -246,11 +246,13 @@ def file_sections(scene: type) -> dict[str, Declaration]:
     declared: dict[str, Declaration] = {}
     for name, (section, required, _) in sections_of(scene).items():
         parts: Mapping[str, Section] = {}
+        needed: list[str] = []
         if isinstance(section, OneOf) and section.short:
-            parts = section.inner[section.short]
+            short = variant_of(section, section.short)
+            parts = short.inner
+            needed = short.needed
         for part, inner in parts.items():
-            is_required = not isinstance(inner, Each)
-            declared[part] = Declaration(inner, is_required, instead=name)
+            declared[part] = Declaration(inner, part in needed, instead=name)
         declared[name] = Declaration(section, required and not parts)
     for name, section in getattr(scene, "once", {}).items():
         declared[name] = Declaration(section)

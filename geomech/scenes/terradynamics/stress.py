@@ -17,10 +17,9 @@ from geomech.io.rows import ENDINGS
 from geomech.io.toml import tables_of
 from geomech.mathematics.systems.swimmer import MEDIA
 from geomech.scenes.format.columns import columns
-from geomech.scenes.format.key import Word
 from geomech.scenes.format.reader import Source, build
 from geomech.scenes.format.sections import Alternatives
-from rft.core.checks import Number
+from rft.core.checks import Number, Word
 from rft.core.refusal import Refusal, located, place_prefix
 from rft.terradynamics.meshes import Spatial
 from rft.terradynamics.plates import VERTICAL, PlateDrags, PlateStress, StressMap

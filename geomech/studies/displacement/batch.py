@@ -34,7 +34,7 @@ def _parts_but_medium(scene: Scene) -> list:
     system = scene.system
     parts: list = [system]
     if isinstance(system, Swimmer):
-        parts = [system.body, system.solver, *system.effects]
+        parts = [system.body, system.contact, system.solver, *system.effects]
     return [*parts, scene.numerics, scene.gait]
 
 
@@ -52,7 +52,7 @@ def _in_common(scene: Scene) -> str:
 
     model: object = system
     if isinstance(system, Swimmer):
-        model = (system.body, system.solver)
+        model = (system.body, system.contact, system.solver)
     joints, lacks = scene.gait.joints, system.traits.lacks
     return repr((model, scene.numerics, joints, lacks, effects))
 
