@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 BODY = "#1b4965"  # colour
+LIFTED = "#9cb4c4"  # colour of the parts of a body that do not touch the ground
+TOUCHES = 0.5  # weight of contact from which a link is drawn as touching
 HEAD = "#d1495b"  # colour of the head, its track and the present shape
 LINES = 8  # shape variables that are drawn as curves; more as a map along the body
 MARKED_LINKS = 12  # of the longest chain whose joints are marked
@@ -51,11 +53,12 @@ class ShownMotion(Motion):
     """A motion whose lengths are in the unit of a picture.
 
     factor: of that unit to the scene's. loops: curves in shape space to draw, gaits or
-    `geomech.results.fields.Loop`."""
+    `geomech.results.fields.Loop`. weights: (P, links), of contact, or None."""
 
     unit: str = "BL"
     factor: float = 1.0
     loops: tuple = ()
+    weights: np.ndarray | None = None
 
     @property
     def size(self) -> float:
@@ -116,7 +119,10 @@ def draw_world(ax: Axes, motion: ShownMotion, rows: Any, limits: Any = None) -> 
     (track,) = ax.plot([], [], color=HEAD, lw=1.0, zorder=3)
     marker = "o" if _has_few_links(motion) else ""
     joints = {"marker": marker, "ms": 3, "mfc": "white", "mew": 0.8}
-    (body,) = ax.plot([], [], color=BODY, lw=2.5, solid_capstyle="round", **joints)
+    weights = motion.weights
+    colour = BODY if weights is None else LIFTED
+    (body,) = ax.plot([], [], color=colour, lw=2.5, solid_capstyle="round", **joints)
+    (touching,) = ax.plot([], [], color=BODY, lw=3.5, solid_capstyle="butt")
     (head,) = ax.plot([], [], "o", color=HEAD, ms=5)
 
     def update(row: int) -> tuple:
@@ -124,9 +130,21 @@ def draw_world(ax: Axes, motion: ShownMotion, rows: Any, limits: Any = None) -> 
         track.set_data(*motion.pose[: row + 1, :2].T)
         body.set_data(*points.T)
         head.set_data(*points[-1:].T)
-        return track, body, head
+        if weights is None:
+            return track, body, head
+        touching.set_data(*_touching_lines(points, weights[row]).T)
+        return track, body, touching, head
 
     return update
+
+
+def _touching_lines(points: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Return the links that touch the ground as a line (2 links + 1, 2) with gaps of
+    nan, from ends (links + 1, 2) and weights (links,)."""
+    touches = (weights >= TOUCHES)[:, None]
+    breaks = np.where(touches, points[:-1], np.nan)
+    links = np.stack([points[:-1], breaks], 1).reshape(-1, 2)
+    return np.concatenate([links, points[-1:]])
 
 
 def _has_few_links(motion: ShownMotion) -> bool:
@@ -252,6 +270,11 @@ def motion_of(result: Result) -> ShownMotion:
     frequency = result.attributes.get("frequency")
     unit, factor = shown_lengths(result)
     phase = result["phase"].values
+    weights = None
+    if "contact_1" in result:
+        count = sum(name.startswith("contact_") for name in result)
+        columns = [result[f"contact_{k + 1}"].values for k in range(count)]
+        weights = np.stack(columns, -1)
     return ShownMotion(
         scene,
         phase,
@@ -261,6 +284,7 @@ def motion_of(result: Result) -> ShownMotion:
         unit=unit,
         factor=factor,
         loops=tuple(loops_of(result, scene.gait)),
+        weights=weights,
     )
 
 

@@ -23,7 +23,16 @@ MAX_POINTS = 100_000_000
 MAX_TESTED_VALUES = 200
 MEDIUM = "medium."  # first letters of its parameters
 MOST_KNOWN = 64  # scenes of a grid that are kept to read other media into
-SECTIONS = ("medium", "body", "gait", "numerics", "system", "physical", "robot")
+SECTIONS = (
+    "medium",
+    "body",
+    "contact",
+    "gait",
+    "numerics",
+    "system",
+    "physical",
+    "robot",
+)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ A new file in this folder is found by itself (`rft.core.registry.load_all`);
 from rft.contacts.base import BEARINGS, CONTACTS, FOLLOWS, ContactRule
 from rft.contacts.functions import FunctionContact
 from rft.contacts.links import LinkContact
+from rft.contacts.state import ContactState, contact_state
 from rft.contacts.support import support_margin
 from rft.contacts.touching import Touching
 from rft.contacts.wave import WaveContact
@@ -19,10 +20,12 @@ __all__ = [
     "CONTACTS",
     "FOLLOWS",
     "ContactRule",
+    "ContactState",
     "FunctionContact",
     "LinkContact",
     "Touching",
     "WaveContact",
+    "contact_state",
     "support_margin",
 ]
 

@@ -52,7 +52,7 @@ class ContactRule:
     "phase" or "shape" (`FOLLOWS`). bearing: who bears the body (`BEARINGS`); in grains
     and on hard ground the drag is taken in proportion to the load (assumed). width:
     with bearing "balanced", the body's width; with it loads balance about the line from
-    tail to head as well.
+    tail to head as well. height: of the centre of mass.
 
     Attributes
     ----------
@@ -75,6 +75,17 @@ class ContactRule:
             "width of the body, over which its load balances from side to side",
         ),
     ] = None
+
+    height: Annotated[
+        float,
+        Number(
+            0,
+            1,
+            "body lengths",
+            "height of the centre of mass above the ground, by which a body on a "
+            "slope rolls over; it changes no load",
+        ),
+    ] = 0.0
 
     kind = "contact"
     varies_along = True

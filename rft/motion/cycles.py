@@ -16,27 +16,29 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rft.balance.backend import check
-from rft.balance.solver import (
-    Accuracy,
-)
+from rft.balance.solver import Accuracy
 from rft.balance.velocity import checked_input
 from rft.bodies.base import Body, body_size, half_lengths
 from rft.bodies.pieces import PIECES
 from rft.core.checks import in_range, real_array
 from rft.core.premise import Premise
-from rft.core.refusal import require
+from rft.core.refusal import Refusal, require
 from rft.effects.base import Effect, broken_premises
 from rft.effects.contact import assemble
 from rft.laws.base import Medium
 from rft.motion import limit_cycle
 from rft.motion.compliance import CompliantStepping, SpringMotion, with_springs
-from rft.motion.stepping import Row, State, Stepping, relative_pose
+from rft.motion.stepping import Row, State, Stepping, relative_pose, runs_away
 from rft.motion.work import Work
 
 MOST_CYCLES = 60
 # of the change from cycle to cycle, below which displacements count as repeated
 REPEATED = 0.01
 PLAIN_CYCLES = 12  # before the memory of a body without mass is led to its limit
+
+
+class SlidesDown(Refusal):
+    """A body on a slope whose weight no slow motion balances."""
 
 
 class TimeSteps(NamedTuple):
@@ -46,7 +48,8 @@ class TimeSteps(NamedTuple):
     (..., N + 1, 3), of the body frame on the ground, whose origin and x axis are those
     of the frame at the first step. residual: (...), the largest, as in `rft.Solution`.
     status: (...), "periodic", "running" (the requested number of cycles, not yet
-    periodic), "not periodic" or "unconverged". drift: (...), largest component of the
+    periodic), "not periodic", "slides" (on a slope, at some phase no slow motion
+    balances the weight) or "unconverged". drift: (...), largest component of the
     sum of all changes of displacement, body lengths and rad, in cycles to come. cycles:
     their number. work: (..., N) each, or None. path: (..., cycles N + 1, 3), all poses
     since the first step, or None. springs: `rft.motion.compliance.SpringMotion` of
@@ -97,8 +100,14 @@ class TimeSteps(NamedTuple):
         return np.moveaxis(relative_pose(start, end), 0, -1)
 
     def checked(self) -> TimeSteps:
-        """Return these steps; RuntimeError if any sample is unconverged or not
-        periodic."""
+        """Return these steps; `SlidesDown` if a body slides down a slope, RuntimeError
+        if any sample is unconverged or not periodic."""
+        if (self.status == "slides").any():
+            raise SlidesDown(
+                "the body slides down the slope",
+                because="at some phase no slow motion balances its weight",
+                instead="lower the angle or the weight, or let more of the body touch",
+            )
         if (self.status == "unconverged").any():
             raise RuntimeError(
                 "a force balance did not converge in time stepping (residual "
@@ -288,6 +297,12 @@ def _cycles(
     if springs is not None and cycles is None:
         status = _with_periods(status, state.cycles.displacements)
     status = np.where(worst <= limit, status, "unconverged")
+    if stepping.reads_place:
+        slid = [
+            (row.residual > row.limit) & runs_away(row.xi, scale)
+            for row, scale in zip(rows, stepping.scales)
+        ]
+        status = np.where(np.any(slid, 0), "slides", status)
     all_poses = None
     if with_path:
         all_poses = np.concatenate([*path, pose[-1:]])

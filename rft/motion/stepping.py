@@ -36,6 +36,8 @@ from rft.motion.work import Work, element_work
 
 # elements x nodes at all phases, up to which their balances are stored: some 8 MB
 MOST_STORED = 100_000
+# of the joint speed, beyond which a body without a balance is sliding away
+RUNAWAY = 1e3
 # of the rms joint speed, below which the joints pause and that speed is the scale
 PAUSE = 1e-9
 
@@ -197,7 +199,9 @@ class Stepping:
             if acts or not first:
                 problem = effect.apply(problem, site, state)
 
-        xi, residual, limit = self._solved(k, problem, None if first else guess)
+        if first:
+            guess = None
+        xi, residual, limit = self._solved(k, problem, guess, self._is_lost(s))
         pose = s.pose
         if not first:
             pose = integrated_pose(pose, (s.xi + xi) / 2, self.dt)
@@ -222,8 +226,14 @@ class Stepping:
             after = self._after_cycle(after, undisturbed, site)
         return after, Row(xi, pose, residual, np.array([limit]), work)
 
+    def _is_lost(self, s: State) -> np.ndarray:
+        """Return whether samples (B,) had no balance at the last step and slid away: no
+        time is spent on further steps of theirs."""
+        k = (int(s.count[0, 0]) - 1) % self.phases
+        return runs_away(s.xi, self.scales[k])
+
     def _solved(
-        self, k: int, problem: Problem, guess: np.ndarray | None
+        self, k: int, problem: Problem, guess: np.ndarray | None, lost: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, float]:
         """Return body velocities, residuals and the largest residual of a solution, of
         a balance at the phase 2 pi k / N."""
@@ -234,7 +244,7 @@ class Stepping:
         xi, residual, limit = from_guess(
             problem, scale, self.accuracy, self.assembly, guess, self._solve_once(k)
         )
-        rest = np.flatnonzero(~(residual <= limit))
+        rest = np.flatnonzero(~(residual <= limit) & ~lost)
         if rest.size:
             found = self._solve_all(problem, scale, rest)
             xi[:, rest] = found.xi
@@ -367,6 +377,12 @@ class Stepping:
         v = with_frame_velocity(problem, velocities(problem), *scaled)
         rounding = np.full(xi.shape[1], self.accuracy.rounding)
         return np.stack(frame_net(problem, v, rounding, *scaled).force)
+
+
+def runs_away(xi: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Return whether velocities (3, B) are those of bodies (B,) that slide away, for a
+    scale of speed (B,)."""
+    return ~(np.abs(xi).max(0) < RUNAWAY * scale)
 
 
 def _phase_after_phase(x: np.ndarray) -> np.ndarray:

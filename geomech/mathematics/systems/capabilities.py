@@ -176,6 +176,20 @@ class Compliant(Protocol):
         before the first phase."""
 
 
+@runtime_checkable
+class PartlyLifted(Protocol):
+    """A body of which parts touch the ground at a time; read by
+    `geomech.studies.mechanics.motion` and `geomech.studies.mechanics.outcome`.
+
+    contact: the rule of contact."""
+
+    contact: Any
+
+    def contact_state(self, alpha, heading) -> Any:
+        """Return the `rft.contacts.ContactState` at shapes (B, d) and headings (B,) of
+        the frame on the ground, rad."""
+
+
 class BalanceSize(NamedTuple):
     """The size of the balance of forces of one velocity; the defaults are for a system
     that solves none.

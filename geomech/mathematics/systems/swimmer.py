@@ -27,6 +27,7 @@ from geomech.mathematics.systems.capabilities import (
     Diagnosed,
     Drawable,
     Part,
+    PartlyLifted,
     Recorded,
     Stepped,
     Symbolic,
@@ -44,7 +45,13 @@ from rft.bodies.base import (
     joint_speed,
 )
 from rft.bodies.pieces import PIECES, subdivide
-from rft.contacts import CONTACTS, ContactRule, Touching
+from rft.contacts import (
+    CONTACTS,
+    ContactRule,
+    ContactState,
+    Touching,
+    contact_state,
+)
 from rft.core.checks import unmasked
 from rft.core.premise import SHAPE_ALONE, Premise
 from rft.core.refusal import Refusal, located
@@ -244,6 +251,8 @@ class Swimmer:
             return None
         if kind is Stepped:
             return _RepeatedCycles(self) if self.traits.steps else None
+        if kind is PartlyLifted:
+            return None if self.contact is None else self
         if kind is Compliant:
             return self if self.traits.compliant else None
         if kind in (Diagnosed, Recorded, Symbolic):
@@ -370,6 +379,25 @@ class Swimmer:
         """Return the swimmer with its body cut into short elements."""
         pieces = max(PIECES, self.balance_size.pieces)
         return dataclasses.replace(self, body=subdivide(self.body, pieces))
+
+    def contact_state(self, alpha: ArrayLike, heading: ArrayLike) -> ContactState:
+        """Return what touches at shapes (B, joints) and headings (B,) of the frame on
+        the ground, rad."""
+        alpha = unmasked("alpha", alpha)
+        shift = np.zeros(len(alpha), complex)
+        slope = self.slope
+        if slope is not None:
+            downhill = -np.exp(1j * (slope.towards - unmasked("heading", heading)))
+            shift = self.contact.height * np.tan(slope.angle) * downhill
+        return contact_state(self.touching_body, alpha, shift, self.solver.pieces)
+
+    @property
+    def slope(self) -> rft.Slope | None:
+        """The slope on which the swimmer moves, None on level ground."""
+        for effect in self.effects:
+            if isinstance(effect, rft.Slope):
+                return effect
+        return None
 
     @property
     def axial_drag(self) -> float:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from geomech.core.variables import Result
+from geomech.core.variables import Result, Variable
 from geomech.mathematics.systems.base import body_size, length_unit
 from geomech.plots.displacement.displacements import draw_measurements, medium_band
 from geomech.plots.look import colours
@@ -16,6 +16,7 @@ from geomech.scenes.data.measurements import METRES, swept_points
 from geomech.scenes.model import Scene
 from geomech.studies.displacement.cycles import AMPLITUDE
 from geomech.studies.displacement.variables import position_spread
+from geomech.studies.mechanics.outcome import CLIMBS, ROLLS, SLIDES, SLIPS
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
@@ -33,6 +34,9 @@ PARAMETER_UNITS = {
     "radius": "BL",
     "distance": "BL",
     "travel": "BL",
+    "lag": "rad",
+    "rise": "rad",
+    "angle": "rad",
     "slope": "1/BL",
     "towards": "rad",
     "tilt": "rad",
@@ -48,6 +52,8 @@ PARAMETER_UNITS = {
 # Of springs whose unit of torque is given.
 TORQUE_UNITS = {"stiffness": "N m/rad", "damping": "N m s/rad"}
 
+MARK = "#b5179e"  # colour of outcomes
+OUTCOME_MARKS = {SLIPS: "v", SLIDES: "x", ROLLS: "o"}
 ESTIMATED = "with estimated error"  # label of a curve
 
 ROBOT_UNITS = {  # likewise, in scenes of robots
@@ -172,18 +178,22 @@ def _net_figure(scene: Scene, result: Result, data: Any) -> Figure:
     else:
         _draw_map(ax, *rising, values[order], label)
         ax.set_ylabel(names[1])
+    if "outcome" in result:
+        _mark_outcomes(ax, result, order, rising)
     return fig
 
 
 def net_values(result: Result) -> tuple:
     """Return (values, their errors, their spread by the medium or None, label) to draw.
 
-    Values are the net distance per cycle, negative where it is backwards; where the
-    frequency differs from point to point, the speed."""
+    Values are the net distance per cycle, negative where it is backwards; on a slope
+    the distance uphill; where the frequency differs from point to point, the speed."""
     net = result["net_distance"]
     distance = np.copysign(net.values, result["x"].values)
     factor: Any = 1.0
     label = f"net distance per cycle ({net.unit})"
+    if "uphill" in result:
+        return _uphill_values(result["uphill"])
     if "frequency" in result and np.ptp(result["frequency"].values) > 0:
         factor = result["frequency"].values
         label = f"speed ({net.unit}/s)"
@@ -194,6 +204,36 @@ def net_values(result: Result) -> tuple:
     if (distance < 0).any():
         label += ",\nbackwards < 0"
     return distance, net.error * factor, spread, label
+
+
+def _uphill_values(uphill: Variable) -> tuple:
+    """Return what `net_values` does of a distance uphill."""
+    label = f"distance uphill per cycle ({uphill.unit})"
+    if (uphill.values < 0).any():
+        label += ",\ndownhill < 0"
+    return uphill.values, uphill.error, None, label
+
+
+def _mark_outcomes(
+    ax: Axes, result: Result, order: Any, rising: list[np.ndarray]
+) -> None:
+    """Mark the points of a sweep of scenes on a slope at which a body does not climb,
+    with a legend."""
+    outcomes = result["outcome"].values[order]
+    for name, marker in OUTCOME_MARKS.items():
+        where = np.nonzero(outcomes == name)
+        if not len(where[0]):
+            continue
+        x = rising[0][where[0]]
+        look = {"s": 22, "label": name, "zorder": 4, "clip_on": False}
+        if len(rising) == 1:
+            height = ax.get_xaxis_transform()
+            ax.scatter(x, 0 * x, marker=marker, color=MARK, transform=height, **look)
+        else:
+            y = rising[1][where[1]]
+            ax.scatter(x, y, marker=marker, color=MARK, **look)
+    if (outcomes != CLIMBS).any():
+        ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
 
 
 @styled
@@ -231,9 +271,10 @@ def _draw_map(
     points."""
     from cmcrameri import cm
 
-    top = np.abs(values).max() or 1.0
+    known = values[np.isfinite(values)]
+    top = np.abs(known).max(initial=0.0) or 1.0
     look: dict[str, Any] = {"cmap": colours("viridis")}
-    if values.min() < 0 < values.max():
+    if known.min(initial=0.0) < 0 < known.max(initial=0.0):
         look = {"cmap": colours(cm.vik), "vmin": -top, "vmax": top}
     image = ax.pcolormesh(x, y, values.T, shading="nearest", rasterized=True, **look)
     if x[0] < x[-1]:

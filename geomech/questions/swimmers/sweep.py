@@ -132,6 +132,16 @@ class Sweep(Question):
         return [f"{result.attributes['scene']}: {points} points, {over}"]
 
     @staticmethod
+    def remarks(result: Result) -> list[str]:
+        if "outcome" not in result:
+            return []
+        outcomes = result["outcome"].values.ravel().tolist()
+        counts = [
+            f"{name} at {outcomes.count(name)}" for name in dict.fromkeys(outcomes)
+        ]
+        return [f"on the slope it {', '.join(counts)} of {len(outcomes)} points"]
+
+    @staticmethod
     def summary(result: Result) -> Result:
         best = [name for name in result if name.startswith("best_")]
         return result.only(*best, *SHOWN)

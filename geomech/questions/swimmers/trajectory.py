@@ -26,6 +26,26 @@ def write_film(path: Path, result: Result) -> None:
     films.write_motion(path, result)
 
 
+def contact_remarks(result: Result) -> list[str]:
+    """Return the outcome on a slope, and how often a body of which parts are lifted
+    would tip over."""
+    lines = []
+    outcome = result.attributes.get("outcome")
+    if outcome is not None:
+        from geomech.studies.mechanics.outcome import OUTCOMES
+
+        lines.append(f"{outcome}: {OUTCOMES[outcome]}")
+    if "support_margin" in result:
+        margin = result["support_margin"].values
+        beyond = int((margin < 0).sum())
+        if beyond:
+            lines.append(
+                f"the centre of mass lies beyond what touches the ground at {beyond} "
+                f"of {len(margin)} phases"
+            )
+    return lines
+
+
 @dataclass(frozen=True)
 class Trajectory(Question):
     """Follow the body through its gait. A table has the pose, the joint angles and the
@@ -110,13 +130,13 @@ class Trajectory(Question):
 
     @staticmethod
     def summary(result: Result) -> Result:
-        return result.only(*FINAL, "actuator_work", "time", *POSE)
+        return result.only(*FINAL, "final_uphill", "actuator_work", "time", *POSE)
 
     @staticmethod
     def remarks(result: Result) -> list[str]:
+        lines = contact_remarks(result)
         if "limit_cycle" not in result:
-            return []
-        lines = []
+            return lines
         count = len(result["limit_cycle"].values)
         if count > 1:
             x = result["cycle_x"].values

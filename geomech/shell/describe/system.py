@@ -13,6 +13,7 @@ from geomech.mathematics.systems.base import System, WrappedSystem, kind_of
 from geomech.mathematics.systems.framed import NAME, Framed
 from geomech.mathematics.systems.swimmer import effect_sizes, name_in
 from rft.bodies import BODIES
+from rft.contacts import BEARINGS, FOLLOWS
 from rft.core.premise import PHASE_ALONE, negation
 from rft.core.refusal import formatted, in_line
 from rft.effects import EFFECTS, ENGINES
@@ -89,7 +90,7 @@ def swimmer_lines(system: Swimmer) -> list[str]:
     """Return medium and body, notes, the effects that are on and off, and the back
     end."""
     law = name_in(LAWS, system.medium)
-    lines = [medium_and_body(system, ", "), *notes(system)]
+    lines = [medium_and_body(system, ", "), *contact_lines(system), *notes(system)]
     for effect in system.effects:
         lines += effect_lines(effect, system)
     used = {effect.kind for effect in system.effects}
@@ -99,6 +100,19 @@ def swimmer_lines(system: Swimmer) -> list[str]:
         *lines,
         f"off (not evaluated): {', '.join(off) or 'none'}",
         f"back end: {system.solver.computed(law_record, law)}",
+    ]
+
+
+def contact_lines(system: Swimmer) -> list[str]:
+    """Return the rule of contact, where its phase comes from, and who bears the
+    body."""
+    contact = system.contact
+    if contact is None:
+        return []
+    return [
+        f"contact: {summary.part(contact.kind, contact)}",
+        f"     phase of contact: {FOLLOWS[contact.follows]}",
+        f"     loads: {BEARINGS[contact.bearing]}",
     ]
 
 

@@ -20,6 +20,13 @@ from geomech.studies.displacement.variables import QUANTITIES, pose_variables
 from geomech.studies.estimates import estimate, uncertainty
 from geomech.studies.estimates.cost import direct_jobs, medium_jobs, total_cost
 from geomech.studies.grid import Grid, values_at_points
+from geomech.studies.mechanics.outcome import (
+    least_margin,
+    outcome,
+    slope_of,
+    uphill,
+)
+from rft.motion.cycles import SlidesDown
 
 BYTES_PER_POINT = 200  # of its row, and of copies while it is written to a file
 SECONDS_PER_SCENE = 6e-4  # to build one from its tables; measured
@@ -104,6 +111,8 @@ class Cycles:
             dims, rows[..., :3], errors, unit, _spreads(rows, length), frequency
         )
         found.append(Variable("body_length", dims, length, unit, "length of the body"))
+        if slope_of(first.system) is not None:
+            found += _slope_variables(grid, found, errors[..., 0], dims, unit)
         if frequency is not None:
             found.append(Variable("frequency", dims, frequency, "Hz"))
 
@@ -112,6 +121,32 @@ class Cycles:
         if error_is:
             facts["error_is"] = error_is
         return found, facts
+
+
+def _slope_variables(
+    grid: Grid,
+    found: list[Variable],
+    errors: np.ndarray,
+    dims: tuple[str, ...],
+    unit: str,
+) -> list[Variable]:
+    """Return the distance uphill and the outcome at every point of a sweep of scenes on
+    a slope, from the variables x and y; errors: (N_1, ...), of the position."""
+    x = found[0].values
+    y = found[1].values
+    climbed = np.empty(x.shape)
+    margin = np.empty(x.shape)
+    for index in np.ndindex(x.shape):
+        point = {name: grid.over[name][k] for name, k in zip(grid.over, index)}
+        scene = grid.scene_factory(tuple(point[name] for name in grid.names))
+        amplitude = point.get(AMPLITUDE, scene.gait.amplitude)
+        climbed[index] = uphill(slope_of(scene.system), x[index], y[index])
+        margin[index] = least_margin(scene.system, scene.gait, amplitude)[0]
+    label = "distance uphill along the slope per cycle"
+    return [
+        Variable("uphill", dims, climbed, unit, label, error=errors),
+        Variable("outcome", dims, outcome(climbed, margin), "", "outcome"),
+    ]
 
 
 def _spreads(rows: np.ndarray, length: np.ndarray) -> dict[str, np.ndarray] | None:
@@ -172,14 +207,26 @@ def _parameters_without_effect(scene: Scene, names) -> tuple[str, ...]:
 
 def _rows(scenes: list[Scene], amplitudes) -> list:
     """Return [[x, y, theta, error, error of theta], ...] for all amplitudes of every
-    scene, solved in batches; errors in body lengths and rad."""
+    scene, solved in batches; errors in body lengths and rad. They are nan for a body
+    that slides down a slope."""
 
     def solve(joined: Scene) -> np.ndarray:
         phases = joined.numerics.phases
         poses, errors = estimate.direct(joined, joined.gait, None, phases)
         return np.column_stack([poses, errors])
 
-    return _solve_in_batches(scenes, amplitudes, solve)
+    try:
+        return _solve_in_batches(scenes, amplitudes, solve)
+    except SlidesDown:
+        gaits = [None] if amplitudes is None else amplitudes
+        if len(scenes) == len(gaits) == 1:
+            return [[np.nan] * ROW_WIDTH]
+    # One by one, as others of the batch may hold.
+    rows = []
+    for scene in scenes:
+        for amplitude in gaits:
+            rows += _rows([scene], None if amplitude is None else [amplitude])
+    return rows
 
 
 def _solve_in_batches(scenes: list[Scene], amplitudes, solve: Callable) -> list:

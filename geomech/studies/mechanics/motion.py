@@ -21,6 +21,7 @@ from geomech.mathematics.systems.base import (
 from geomech.mathematics.systems.capabilities import (
     Compliant,
     Drawable,
+    PartlyLifted,
     Stepped,
     balance_size,
     capability,
@@ -37,6 +38,7 @@ from geomech.studies.estimates.cost import (
     total_cost,
 )
 from geomech.studies.maps import fields
+from geomech.studies.mechanics.outcome import can_roll, outcome, slope_of, uphill
 from geomech.studies.realised import commanded, limit_cycles
 from geomech.studies.scene_tables import SceneTables
 from rft.core.checks import is_whole
@@ -65,7 +67,9 @@ class Motion:
     the body frame in the frame at phase 0, on the ground, in the scene's unit and rad.
     frequency: of the gait, Hz, or None. springs: what joints that give way do in one
     cycle (`rft.motion.compliance.SpringMotion`), or None; alpha is then the shape that
-    the body really takes, and command (P, joints) that of the gait."""
+    the body really takes, and command (P, joints) that of the gait. contact: what
+    touches at every phase (`rft.contacts.ContactState`), or None for all of the
+    body."""
 
     scene: Scene
     phase: np.ndarray
@@ -74,6 +78,7 @@ class Motion:
     frequency: float | None
     command: np.ndarray | None = None
     springs: SpringMotion | None = None
+    contact: Any = None
 
     @property
     def cycles(self) -> int:
@@ -130,12 +135,20 @@ def attributes(motion: Motion) -> dict[str, Any]:
     }
     if motion.frequency is not None:
         facts["frequency"] = float(motion.frequency)
+    slope = slope_of(scene.system)
+    if slope is not None:
+        margin = np.inf
+        lifted = capability(scene.system, PartlyLifted)
+        if lifted is not None and can_roll(lifted):
+            margin = motion.contact.margin.min()
+        climbed = uphill(slope, *motion.pose[-1, :2])
+        facts["outcome"] = str(outcome(climbed, margin))
     return facts
 
 
 def variables(motion: Motion) -> list[Variable]:
     """Return the final pose, and time, pose, shape and ends of all links at every
-    phase."""
+    phase, and what touches the ground where that is not all of the body."""
     scene = motion.scene
     system = scene.system
     unit = length_unit(system)
@@ -160,6 +173,8 @@ def variables(motion: Motion) -> list[Variable]:
         found.append(Variable(name, OVER, values, shape_unit, label))
     if motion.springs is not None and motion.command is not None:
         found += spring_variables(motion, motion.springs, motion.command)
+    if motion.contact is not None:
+        found += contact_variables(motion.contact, body_size(system), unit)
     return found + end_variables(motion.points(), unit)
 
 
@@ -208,6 +223,23 @@ def spring_variables(
     return found
 
 
+def contact_variables(state: Any, size: float, unit: str) -> list[Variable]:
+    """Return the weight of contact and the load of every link, and how far the centre
+    of mass lies inside the support, at every phase.
+
+    size, unit: length of the body, and its unit."""
+    found = []
+    for k, (weight, load) in enumerate(zip(state.weight.T, state.load.T), 1):
+        label = f"contact of link {k}, 0 lifted, 1 on the ground"
+        found.append(Variable(f"contact_{k}", OVER, weight, "1", label))
+        label = f"load on link {k}, over the mean of the body"
+        found.append(Variable(f"load_{k}", OVER, load, "1", label))
+    label = "distance of the centre of mass inside the support, negative outside"
+    margin = size * state.margin
+    found.append(Variable("support_margin", OVER, margin, unit, label))
+    return found
+
+
 def limit_cycle_variables(scene: Scene) -> list[Variable]:
     """Return the displacements of the different cycles that joints which give way
     settle into from four starts, and the number of starts that reach none."""
@@ -242,6 +274,11 @@ def final_pose(motion: Motion) -> list[Variable]:
             zero = zero_reason(reasons[name])
         label = "after the last cycle"
         found.append(Variable(f"final_{name}", (), value, pose_unit, label, zero=zero))
+    slope = slope_of(system)
+    if slope is not None:
+        climbed = uphill(slope, *motion.pose[-1, :2])
+        label = "after the last cycle, along the slope"
+        found.append(Variable("final_uphill", (), climbed, unit, label))
     return found
 
 
@@ -291,8 +328,14 @@ def compute_motion(scene: Scene, cycles: int = 1) -> Motion:
         else:
             pose = stepped.path(alpha, alphadot, int(cycles))
     rows = np.arange(len(pose))
+    shapes = alpha[rows % phases]
+    contact = None
+    lifted = capability(scene.system, PartlyLifted)
+    if lifted is not None:
+        contact = lifted.contact_state(shapes, pose[:, 2])
     phase = 2 * np.pi * rows / phases
-    return Motion(scene, phase, alpha[rows % phases], pose, frequency_of(scene))
+    frequency = frequency_of(scene)
+    return Motion(scene, phase, shapes, pose, frequency, contact=contact)
 
 
 def _compliant_motion(
