@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from geomech.scenes.model import Scene
     from geomech.studies.displacement.sweep import Plan
 
-SHOWN = ("net_distance", "speed", "status")
+SHOWN = ("net_distance", "speed", "uphill", "status")
 LARGEST_DRAWN = 2  # parameters of a figure
 
 
@@ -136,9 +136,8 @@ class Sweep(Question):
         if "outcome" not in result:
             return []
         outcomes = result["outcome"].values.ravel().tolist()
-        counts = [
-            f"{name} at {outcomes.count(name)}" for name in dict.fromkeys(outcomes)
-        ]
+        names = dict.fromkeys(outcomes)
+        counts = [f"{name} at {outcomes.count(name)}" for name in names]
         return [f"on the slope it {', '.join(counts)} of {len(outcomes)} points"]
 
     @staticmethod
