@@ -54,7 +54,7 @@ from rft.contacts import (
 )
 from rft.core.checks import unmasked
 from rft.core.premise import SHAPE_ALONE, Premise
-from rft.core.refusal import Refusal, located
+from rft.core.refusal import Refusal, located, require
 from rft.effects import EFFECTS
 from rft.effects.contact import assemble, varies_along
 from rft.formulas import se2
@@ -112,6 +112,14 @@ class Swimmer:
     kind = "swimmer"
 
     def __post_init__(self):
+        if isinstance(self.body, Touching):
+            require(
+                self.contact is None,
+                "the body has a rule of contact already",
+                instead="leave ``contact`` out",
+            )
+            object.__setattr__(self, "contact", self.body.contact)
+            object.__setattr__(self, "body", self.body.inner)
         checked_body(self.body)
         refuse_mutable(self.body)
         rft.effects.broken_premises(self.effects)

@@ -174,7 +174,12 @@ def variables(motion: Motion) -> list[Variable]:
     if motion.springs is not None and motion.command is not None:
         found += spring_variables(motion, motion.springs, motion.command)
     if motion.contact is not None:
-        found += contact_variables(motion.contact, body_size(system), unit)
+        found += contact_variables(motion.contact)
+        lifted = capability(system, PartlyLifted)
+        if lifted is not None and can_roll(lifted):
+            label = "distance of the centre of mass inside what touches, < 0 outside"
+            margin = body_size(system) * motion.contact.margin
+            found.append(Variable("support_margin", OVER, margin, unit, label))
     return found + end_variables(motion.points(), unit)
 
 
@@ -223,20 +228,14 @@ def spring_variables(
     return found
 
 
-def contact_variables(state: Any, size: float, unit: str) -> list[Variable]:
-    """Return the weight of contact and the load of every link, and how far the centre
-    of mass lies inside the support, at every phase.
-
-    size, unit: length of the body, and its unit."""
+def contact_variables(state: Any) -> list[Variable]:
+    """Return the weight of contact and the load of every link at every phase."""
     found = []
     for k, (weight, load) in enumerate(zip(state.weight.T, state.load.T), 1):
         label = f"contact of link {k}, 0 lifted, 1 on the ground"
         found.append(Variable(f"contact_{k}", OVER, weight, "1", label))
         label = f"load on link {k}, over the mean of the body"
         found.append(Variable(f"load_{k}", OVER, load, "1", label))
-    label = "distance of the centre of mass inside the support, negative outside"
-    margin = size * state.margin
-    found.append(Variable("support_margin", OVER, margin, unit, label))
     return found
 
 
