@@ -4,11 +4,11 @@ Left: the scene `sidewinder` over three cycles, from light to dark; thick where 
 touches the ground, which leaves separate tracks aslant to the direction of travel.
 Middle: its displacement along and across the body against the lag of the wave of
 contact behind the horizontal wave, with estimated errors as bands, and the displacement
-of the same wave without lifting. A quarter of a cycle sends it sideways without turning. Right: distance
-uphill per cycle on slopes towards its left, over the share of a cycle for which a part
-touches, and what becomes of it where it does not climb. The steeper the slope, the more
-of the body must touch, as in sidewinders (Marvi et al., Science 346, 224, 2014): a
-trend, as amplitude and weight are assumed.
+of the same wave without lifting. A quarter of a cycle sends it sideways without
+turning. Right: distance uphill per cycle on slopes towards its left, over the share of
+a cycle for which a part touches, and what becomes of it where it does not climb. The
+steeper the slope, the more of the body must touch, as in sidewinders (Marvi et al.,
+Science 346, 224, 2014): a trend, as amplitude and weight are assumed.
 """
 
 from __future__ import annotations

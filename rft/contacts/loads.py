@@ -12,7 +12,7 @@ import numpy as np
 # A weak spring against rotation, over that of a body which touches everywhere, so that
 # a body whose centre of mass has no support has a solution: all its load where it comes
 # closest to balance.
-RESTRAINT = 1e-10
+RESTRAINT = 1e-12
 STEPS = 200
 ACCURATE = 1e-13
 # A line from tail to head that is shorter than this has no direction, body lengths.
@@ -98,4 +98,5 @@ def _pressure(levers: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
         best = new
         if (np.abs(step) <= ACCURATE * (1.0 + np.abs(tilt))).all():
             break
-    return np.maximum(np.einsum("bk,kmb->mb", tilt, levers), 0.0)
+    pressure = np.maximum(np.einsum("bk,kmb->mb", tilt, levers), 0.0)
+    return pressure / (stiffness * pressure).sum(0)  # exactly the weight
