@@ -76,6 +76,17 @@ class ShownMotion(Motion):
     def own_points(self, rows: Any) -> np.ndarray | None:
         return super().points(rows)
 
+    def leg_points(self, rows: Any = slice(None)) -> np.ndarray | None:
+        """Return shoulders and feet as `Motion.leg_points` does, in the unit."""
+        pose = self.pose / [self.factor, self.factor, 1.0]
+        legs = replace(self, pose=pose, factor=1.0).own_leg_points(rows)
+        if legs is None:
+            return None
+        return self.factor * legs
+
+    def own_leg_points(self, rows: Any) -> np.ndarray | None:
+        return super().leg_points(rows)
+
 
 # The world
 
@@ -84,6 +95,9 @@ def world_limits(motion: ShownMotion, rows: Any) -> tuple[np.ndarray, np.ndarray
     """Return the lowest and highest (x, y) of the track and of the body at these rows,
     with a margin."""
     points = [motion.pose[:, :2], _bodies(motion, rows).reshape(-1, 2)]
+    legs = motion.leg_points(rows)
+    if legs is not None:
+        points.append(legs.reshape(-1, 2))
     low = np.concatenate(points).min(0)
     high = np.concatenate(points).max(0)
     margin = MARGIN * max(*(high - low), 1e-9 * motion.size)
@@ -120,9 +134,12 @@ def draw_world(ax: Axes, motion: ShownMotion, rows: Any, limits: Any = None) -> 
     marker = "o" if _has_few_links(motion) else ""
     joints = {"marker": marker, "ms": 3, "mfc": "white", "mew": 0.8}
     weights = motion.weights
-    colour = BODY if weights is None else LIFTED
+    has_legs = motion.leg_points(slice(0, 1)) is not None
+    colour = BODY if weights is None or has_legs else LIFTED
     (body,) = ax.plot([], [], color=colour, lw=2.5, solid_capstyle="round", **joints)
     (touching,) = ax.plot([], [], color=BODY, lw=3.5, solid_capstyle="butt")
+    (legs,) = ax.plot([], [], color=LIFTED, lw=1.5, zorder=1.9)
+    (feet,) = ax.plot([], [], "o", color=BODY, ms=4)
     (head,) = ax.plot([], [], "o", color=HEAD, ms=5)
 
     def update(row: int) -> tuple:
@@ -132,10 +149,21 @@ def draw_world(ax: Axes, motion: ShownMotion, rows: Any, limits: Any = None) -> 
         head.set_data(*points[-1:].T)
         if weights is None:
             return track, body, head
+        if has_legs:
+            lines = motion.leg_points(slice(row, row + 1))[0]
+            legs.set_data(*_separated(lines).T)
+            feet.set_data(*lines[weights[row] >= TOUCHES, 1].T)
+            return track, body, legs, feet, head
         touching.set_data(*_touching_lines(points, weights[row]).T)
         return track, body, touching, head
 
     return update
+
+
+def _separated(lines: np.ndarray) -> np.ndarray:
+    """Return lines (n, 2, 2) one after the other (3 n, 2), with nan between them."""
+    gaps = np.full((len(lines), 1, 2), np.nan)
+    return np.concatenate([lines, gaps], 1).reshape(-1, 2)
 
 
 def _touching_lines(points: np.ndarray, weights: np.ndarray) -> np.ndarray:

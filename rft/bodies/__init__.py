@@ -6,6 +6,7 @@ here are the public names. `rft.bodies.chain` is a short example."""
 from rft.bodies.backbone import Backbone, ConstantCurvature, Serpenoid
 from rft.bodies.base import BODIES, Body, Elements
 from rft.bodies.chain import Chain
+from rft.bodies.legged import LeggedChain
 from rft.bodies.positions import Positions
 from rft.core.registry import load_all
 
@@ -18,6 +19,7 @@ __all__ = [
     "Chain",
     "ConstantCurvature",
     "Elements",
+    "LeggedChain",
     "Positions",
     "Serpenoid",
 ]

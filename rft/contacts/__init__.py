@@ -7,11 +7,10 @@ A new file in this folder is found by itself (`rft.core.registry.load_all`);
 from rft.contacts.base import BEARINGS, CONTACTS, FOLLOWS, ContactRule
 from rft.contacts.functions import FunctionContact
 from rft.contacts.links import LinkContact
-from rft.contacts.state import ContactState, contact_state
-from rft.contacts.support import support_margin
 from rft.contacts.touching import Touching
 from rft.contacts.wave import WaveContact
 from rft.core.registry import load_all
+from rft.formulas.support import ContactState, support_margin
 
 load_all(__name__, __path__)
 
@@ -25,7 +24,6 @@ __all__ = [
     "LinkContact",
     "Touching",
     "WaveContact",
-    "contact_state",
     "support_margin",
 ]
 

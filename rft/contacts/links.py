@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from rft.contacts.base import CONTACTS, ContactRule, Rise, on_weight
+from rft.contacts.base import CONTACTS, ContactRule, Rise
 from rft.core.checks import real_array
 from rft.core.refusal import Refusal, require
+from rft.formulas.steps import on_weight
 
 
 @CONTACTS.register

@@ -9,10 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rft.bodies.base import Body, Elements, joint_angles, numbered_labels
+from rft.bodies.base import (
+    Body,
+    Elements,
+    half_lengths,
+    joint_angles,
+    numbered_labels,
+)
+from rft.bodies.pieces import PIECES, subdivide
 from rft.contacts.base import ContactRule
 from rft.core.checks import unmasked
 from rft.core.refusal import require
+from rft.formulas.support import ContactState, support_margin
 
 PHASE_LABEL = ("contact phase", "rad")
 PERIOD = 2 * np.pi
@@ -46,6 +54,12 @@ class Touching:
             isinstance(self.contact, ContactRule),
             "contact must be a rule such as WaveContact()",
             value=self.contact,
+        )
+        require(
+            not hasattr(self.inner, "contact_factors"),
+            "this body has a contact of its own",
+            where="contact",
+            instead="remove the rule of contact",
         )
         self.contact.check(self.inner)
 
@@ -112,6 +126,61 @@ class Touching:
         centres = np.broadcast_to(elements.centres, size)
         along = np.broadcast_to(along, size)
         return self.contact.factors(station, fraction, centres, along, phase)
+
+    @property
+    def rests(self) -> bool:
+        """Whether the body lies on the ground, so that it may roll over: the ground
+        holds one that is buried, unless its height is given."""
+        return self.contact.bearing != "buried" or self.contact.height > 0
+
+    @property
+    def height(self) -> float:
+        """Height of the centre of mass above the ground, body lengths."""
+        return self.contact.height
+
+    def contact_state(
+        self,
+        alpha: np.ndarray,
+        shift: np.ndarray | complex = 0.0,
+        pieces: int = PIECES,
+    ) -> ContactState:
+        """Return the contact of the elements of the inner body at shapes (B, joints).
+
+        shift: (B,), as of `rft.support_margin`. pieces: to a body length, into which
+        elements are cut, and over which weights and loads of an element are means.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from rft import Chain
+        >>> from rft.contacts import LinkContact, Touching
+        >>> feet = LinkContact(links=((0.0, 0.6), (), (0.5, 0.1)), bearing="normalised")
+        >>> body = Touching(Chain(), feet)
+        >>> state = body.contact_state(np.array([[0.3, 0.3, np.pi / 2]]))
+        >>> state.weight, state.load  # of a body that rests on its tail link
+        (array([[1., 0., 0.]]), array([[3., 0., 0.]]))
+        """
+        shapes = np.ascontiguousarray(alpha.T)
+        cut = subdivide(self, pieces)
+        elements = cut.motion(shapes, np.zeros_like(shapes))
+        half = elements.half
+        station = np.cumsum(2 * half, 0) - half
+        fraction = half / half.sum()
+        size = (len(half), shapes.shape[1])
+        centres = np.broadcast_to(elements.centres, size)
+        along = np.broadcast_to(elements.c + 1j * elements.s, size)
+        rule = self.contact
+        phase = self.contact_phase(shapes)
+        weight = rule.checked_weights(rule.placed(station, self.inner), phase)
+        load = self.contact_factors(shapes, elements, station, fraction)
+        width = rule.width or 0.0
+        margin = support_margin(weight, fraction, centres, along, width, shift)
+
+        ends = np.cumsum(2 * half_lengths(self.inner))
+        owner = np.searchsorted(ends, station[:, 0] - 1e-12)
+        owned = fraction[:, 0] * (owner == np.arange(len(ends))[:, None])
+        means = owned / owned.sum(1, keepdims=True)
+        return ContactState((means @ weight).T, (means @ load).T, margin)
 
     def points(self, alpha: ArrayLike, pose: ArrayLike = (0.0, 0.0, 0.0)) -> np.ndarray:
         """Return the ends of the links in the world, as the inner body does."""

@@ -8,9 +8,10 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.contacts.base import CONTACTS, ContactRule, Rise, on_weight
+from rft.contacts.base import CONTACTS, ContactRule, Rise
 from rft.core.checks import Number
 from rft.core.refusal import require
+from rft.formulas.steps import on_weight
 
 
 @CONTACTS.register

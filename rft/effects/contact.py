@@ -343,6 +343,13 @@ def _assembled(medium, body, effects, rule, pieces) -> Assembly:
     for each in members(medium):
         for effect in effects:
             effect.check(each)
+    if hasattr(body, "leg_points"):
+        for effect in effects:
+            require(
+                not (effect.adds_points or effect.varies_along),
+                f"{effect.kind} does not know bodies with legs",
+                instead="remove the effect",
+            )
     if touching is not None:
         for effect in effects:
             require(
@@ -354,7 +361,7 @@ def _assembled(medium, body, effects, rule, pieces) -> Assembly:
             )
     zero = np.zeros((body.joints, 1))
     e = body.motion(zero, zero)
-    station = np.cumsum(2 * e.half, 0) - e.half
+    station = stations_of(body, e.half)
     no_points = Contact(Elements(*(x[:0] for x in e)), station[:0], station[:0])
     # Effects that add points act first, so that all others act on these points,
     # whatever their order.
@@ -385,6 +392,16 @@ def _assembled(medium, body, effects, rule, pieces) -> Assembly:
     return assembly._replace(
         effects=ordered, n_elements=n_elements, n_law_points=n_law_points
     )
+
+
+def stations_of(body: Body, half: np.ndarray) -> np.ndarray:
+    """Return the places (n, 1) of a body's elements along it, 0 at its tail and 1 at
+    its head, from their half lengths (n, 1): one after the other, unless the body has
+    ``stations``, as one with legs has."""
+    stations = getattr(body, "stations", None)
+    if stations is not None:
+        return stations
+    return np.cumsum(2 * half, 0) - half
 
 
 def varies_along(body: Body, effects: Sequence) -> bool:

@@ -24,7 +24,7 @@ from rft import (
     time_steps,
     work_done,
 )
-from rft.contacts import BEARINGS, CONTACTS, contact_state, support_margin
+from rft.contacts import BEARINGS, CONTACTS, support_margin
 from rft.contacts.loads import balanced_loads
 from rft.core.refusal import Refusal
 
@@ -252,11 +252,11 @@ def test_the_height_of_the_centre_of_mass_moves_it_downhill():
     rule = WaveContact(duty=1, bearing="normalised", height=0.1)
     body = Touching(Chain((1,) * 8), rule)
     straight = np.zeros((1, body.joints))
-    level = contact_state(body, straight).margin[0]
-    ahead = contact_state(body, straight, shift=0.1 * math.tan(0.5)).margin[0]
+    level = body.contact_state(straight).margin[0]
+    ahead = body.contact_state(straight, shift=0.1 * math.tan(0.5)).margin[0]
     assert level == pytest.approx(0.0, abs=1e-9)  # a line supports no body
     assert ahead == pytest.approx(0.0, abs=1e-9)
-    aside = contact_state(body, straight, shift=0.1j * math.tan(0.5)).margin[0]
+    aside = body.contact_state(straight, shift=0.1j * math.tan(0.5)).margin[0]
     assert aside == pytest.approx(-0.1 * math.tan(0.5), abs=1e-5)
 
 

@@ -181,9 +181,10 @@ class PartlyLifted(Protocol):
     """A body of which parts touch the ground at a time; read by
     `geomech.studies.mechanics.motion` and `geomech.studies.mechanics.outcome`.
 
-    contact: the rule of contact."""
+    touching_body: the body, which ``rests`` if it lies on the ground, so that it may
+    roll over."""
 
-    contact: Any
+    touching_body: Any
 
     def contact_state(self, alpha, heading) -> Any:
         """Return the `rft.contacts.ContactState` at shapes (B, d) and headings (B,) of

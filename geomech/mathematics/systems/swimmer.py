@@ -26,6 +26,7 @@ from geomech.mathematics.systems.capabilities import (
     Compliant,
     Diagnosed,
     Drawable,
+    Loaded,
     Part,
     PartlyLifted,
     Recorded,
@@ -50,7 +51,6 @@ from rft.contacts import (
     ContactRule,
     ContactState,
     Touching,
-    contact_state,
 )
 from rft.core.checks import unmasked
 from rft.core.premise import SHAPE_ALONE, Premise
@@ -216,7 +216,7 @@ class Swimmer:
         medium = self.medium
         body = self.body
         effects = self.effects
-        lifted = self.contact is not None
+        lifted = hasattr(self.touching_body, "contact_factors")
         is_central = is_odd(medium)
         is_reversed = is_central and is_reversible(body)
         is_reversed = is_reversed and not effects and not lifted
@@ -260,7 +260,10 @@ class Swimmer:
         if kind is Stepped:
             return _RepeatedCycles(self) if self.traits.steps else None
         if kind is PartlyLifted:
-            return None if self.contact is None else self
+            is_lifted = hasattr(self.touching_body, "contact_factors")
+            return self if is_lifted else None
+        if kind is Loaded and hasattr(self.body, "leg_points"):
+            return None
         if kind is Compliant:
             return self if self.traits.compliant else None
         if kind in (Diagnosed, Recorded, Symbolic):
@@ -391,13 +394,14 @@ class Swimmer:
     def contact_state(self, alpha: ArrayLike, heading: ArrayLike) -> ContactState:
         """Return what touches at shapes (B, joints) and headings (B,) of the frame on
         the ground, rad."""
+        body: Any = self.touching_body
         alpha = unmasked("alpha", alpha)
         shift = np.zeros(len(alpha), complex)
         slope = self.slope
         if slope is not None:
             downhill = -np.exp(1j * (slope.towards - unmasked("heading", heading)))
-            shift = self.contact.height * np.tan(slope.angle) * downhill
-        return contact_state(self.touching_body, alpha, shift, self.solver.pieces)
+            shift = body.height * np.tan(slope.angle) * downhill
+        return body.contact_state(alpha, shift, self.solver.pieces)
 
     @property
     def slope(self) -> rft.Slope | None:

@@ -99,6 +99,14 @@ class Motion:
             return None
         return body.points(self.alpha[rows], self.pose[rows])
 
+    def leg_points(self, rows: Any = slice(None)) -> np.ndarray | None:
+        """Return shoulders and feet in the world (..., legs, 2, 2) at some of the rows;
+        None for a body without legs."""
+        body: Any = capability(self.scene.system, Drawable)
+        if not hasattr(body, "leg_points"):
+            return None
+        return body.leg_points(self.alpha[rows], self.pose[rows])
+
 
 def is_mapped(scene: Scene) -> bool:
     """Return whether the shapes of a scene are seen on a map of its CCF."""
@@ -174,7 +182,9 @@ def variables(motion: Motion) -> list[Variable]:
     if motion.springs is not None and motion.command is not None:
         found += spring_variables(motion, motion.springs, motion.command)
     if motion.contact is not None:
-        found += contact_variables(motion.contact)
+        legs = motion.leg_points()
+        found += contact_variables(motion.contact, "link" if legs is None else "leg")
+        found += foot_variables(legs, unit)
         lifted = capability(system, PartlyLifted)
         if lifted is not None and can_roll(lifted):
             label = "distance of the centre of mass inside what touches, < 0 outside"
@@ -228,14 +238,28 @@ def spring_variables(
     return found
 
 
-def contact_variables(state: Any) -> list[Variable]:
-    """Return the weight of contact and the load of every link at every phase."""
+def contact_variables(state: Any, part: str) -> list[Variable]:
+    """Return the weight of contact and the load of every link, or leg, at every
+    phase."""
     found = []
     for k, (weight, load) in enumerate(zip(state.weight.T, state.load.T), 1):
-        label = f"contact of link {k}, 0 lifted, 1 on the ground"
+        label = f"contact of {part} {k}, 0 lifted, 1 on the ground"
         found.append(Variable(f"contact_{k}", OVER, weight, "1", label))
-        label = f"load on link {k}, over the mean of the body"
+        label = f"load on {part} {k}, over the mean of all"
         found.append(Variable(f"load_{k}", OVER, load, "1", label))
+    return found
+
+
+def foot_variables(legs: np.ndarray | None, unit: str) -> list[Variable]:
+    """Return the places of the feet from shoulders and feet (P, legs, 2, 2), a variable
+    for each coordinate; none without legs."""
+    found: list[Variable] = []
+    if legs is None:
+        return found
+    for k in range(legs.shape[1]):
+        for axis, values in zip("xy", legs[:, k, 1].T):
+            label = f"{axis} of the foot of leg {k + 1}, left and right of each pair"
+            found.append(Variable(f"foot_{k + 1}_{axis}", OVER, values, unit, label))
     return found
 
 

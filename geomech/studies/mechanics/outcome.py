@@ -51,9 +51,8 @@ def least_margin(system: System, gait: Gait, amplitudes: ArrayLike) -> np.ndarra
 
 
 def can_roll(lifted: PartlyLifted) -> bool:
-    """Return whether a body rests on the ground, so that it may roll over: the ground
-    holds one that is buried, unless its height is given."""
-    return lifted.contact.bearing != "buried" or lifted.contact.height > 0
+    """Return whether a body rests on the ground, so that it may roll over."""
+    return lifted.touching_body.rests
 
 
 def outcome(climbed: ArrayLike, margin: ArrayLike) -> np.ndarray:

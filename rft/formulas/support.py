@@ -1,11 +1,26 @@
-"""Whether the parts that touch support the body, or it tips over."""
+"""What touches the ground, and whether it supports the body or lets it tip over."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 TOUCHES = 0.5  # weight of contact from which a part counts as support
 DIRECTIONS = 360  # of the lines that bound the support
+
+
+class ContactState(NamedTuple):
+    """Contact of B shapes of a body of n parts, its links or its legs.
+
+    weight: (B, n), 0 to 1. load: (B, n), on a part, over the mean load of the body;
+    where the body is buried that is its weight of contact. margin: (B,), how far the
+    centre of mass lies inside the support, body lengths; negative outside
+    (`support_margin`)."""
+
+    weight: np.ndarray
+    load: np.ndarray
+    margin: np.ndarray
 
 
 def support_margin(
