@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rft.balance.force import LinkForce, link_force
     from rft.balance.velocity import BodyVelocity, Solution, body_velocity
-    from rft.bodies import Backbone, Body, Chain, ConstantCurvature, Serpenoid
+    from rft.bodies import (
+        Backbone,
+        Body,
+        Chain,
+        ConstantCurvature,
+        LeggedChain,
+        Serpenoid,
+    )
     from rft.contacts import (
         FunctionContact,
         LinkContact,
@@ -41,7 +48,7 @@ SOLVER = 14
 _NAMES = {
     "rft.balance.force": "LinkForce link_force",
     "rft.balance.velocity": "BodyVelocity Solution body_velocity",
-    "rft.bodies": "Backbone Body Chain ConstantCurvature Serpenoid",
+    "rft.bodies": "Backbone Body Chain ConstantCurvature LeggedChain Serpenoid",
     "rft.contacts": "FunctionContact LinkContact Touching WaveContact support_margin",
     "rft.effects": "BodyInertia DepthProfile DisturbedGround EndCaps GrainInertia "
     "SkinFriction Slope Springs TowedSled Transient",
@@ -85,6 +92,7 @@ __all__ = [
     "FunctionContact",
     "GrainInertia",
     "Granular",
+    "LeggedChain",
     "LinkContact",
     "LinkForce",
     "Medium",
