@@ -337,19 +337,19 @@ def _assembled(medium, body, effects, rule, pieces) -> Assembly:
     checked_body(body)
     in_range("pieces", pieces, 1, MOST_PIECES, whole=True)
     touching = body if hasattr(body, "contact_factors") else None
-    if varies_along(body, effects):
-        body = subdivide(body, pieces)
-    effects = tuple(effect.in_body_lengths(body.length) for effect in effects)
-    for each in members(medium):
-        for effect in effects:
-            effect.check(each)
-    if hasattr(body, "leg_points"):
+    if hasattr(touching, "leg_points"):
         for effect in effects:
             require(
                 not (effect.adds_points or effect.varies_along),
                 f"{effect.kind} does not know bodies with legs",
                 instead="remove the effect",
             )
+    if varies_along(body, effects):
+        body = subdivide(body, pieces)
+    effects = tuple(effect.in_body_lengths(body.length) for effect in effects)
+    for each in members(medium):
+        for effect in effects:
+            effect.check(each)
     if touching is not None:
         for effect in effects:
             require(
