@@ -84,10 +84,6 @@ class LeggedChain:
             0, 1, "-", "factor of the drag on the links, 0 of a body that is lifted"
         ),
     ] = 0.0
-    height: Annotated[
-        float,
-        Number(0, 1, "body lengths", "height of the centre of mass above the ground"),
-    ] = 0.0
     kind = "legged-chain"
 
     def __post_init__(self):
