@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rft.contacts.base import ContactRule
+from rft.core.refusal import Refusal, require
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +36,22 @@ class FunctionContact(ContactRule):
 
     def __post_init__(self):
         super().__post_init__()
-        self._check_weights()
+        require(
+            callable(self.function),
+            "function must be a function of places and phases",
+            value=self.function,
+            where="contact",
+        )
+        try:
+            self._check_weights()
+        except Refusal:
+            raise
+        except Exception as error:
+            raise Refusal(
+                "function fails",
+                because=f"{type(error).__name__}: {error}",
+                where="contact",
+            ) from error
 
     def weights(self, station: np.ndarray, phase: np.ndarray) -> np.ndarray:
         return self.function(station, phase)

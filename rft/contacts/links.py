@@ -41,6 +41,12 @@ class LinkContact(ContactRule):
 
     def __post_init__(self):
         super().__post_init__()
+        require(
+            isinstance(self.links, (tuple, list)),
+            "links must be a list with an entry for each link",
+            value=self.links,
+            where="contact",
+        )
         object.__setattr__(self, "links", tuple(map(self._checked, self.links)))
         require(
             len(self.links) > 0,

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from rft.bodies.base import (
     Body,
     Elements,
+    checked_body,
     half_lengths,
     joint_angles,
     numbered_labels,
@@ -50,6 +51,7 @@ class Touching:
     contact: ContactRule
 
     def __post_init__(self):
+        checked_body(self.inner)
         require(
             isinstance(self.contact, ContactRule),
             "contact must be a rule such as WaveContact()",

@@ -31,7 +31,8 @@ from rft.balance.compliant import (
 )
 from rft.balance.listening import listener
 from rft.balance.solver import begin, limits_of, problem_limits
-from rft.bodies.base import joint_speed
+from rft.bodies.base import joint_angles, joint_speed
+from rft.core.refusal import require
 from rft.effects.base import Effect, Site
 from rft.effects.contact import Assembly, Problem, take
 from rft.effects.springs import JointSprings, Springs
@@ -88,6 +89,7 @@ class CompliantStepping(Stepping):
             self.alphadot = self.alphadot.copy()
             self.alpha[:, passive] = 0.0
             self.alphadot[:, passive] = 0.0
+        self._check_steps()
         self.start = start
         if start is None:
             self.start = self.alpha[-1].copy()
@@ -97,6 +99,18 @@ class CompliantStepping(Stepping):
         if takes(self):
             self._ahead = StepsAhead(self)
         self.has_mass = any(hasattr(effect, "mass") for effect in self.effects)
+
+    def _check_steps(self) -> None:
+        """Raise ValueError if a command turns a joint by more than half a turn from
+        one phase to the next, which no step resolves."""
+        angles = np.stack([joint_angles(self.assembly.body, x) for x in self.alpha])
+        largest = np.abs(angles - np.roll(angles, 1, axis=0)).max(initial=0.0)
+        require(
+            largest <= np.pi,
+            f"the command turns a joint by {largest:.3g} rad between two phases",
+            because="springs follow half a turn at most",
+            instead="raise phases, or lower the amplitude",
+        )
 
     @cached_property
     def scales(self) -> np.ndarray:

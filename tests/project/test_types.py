@@ -73,6 +73,13 @@ PARTS = {
     "Backbone": rft.Backbone(8),
     "Serpenoid": rft.Serpenoid(8),
     "ConstantCurvature": rft.ConstantCurvature(8),
+    "LeggedChain": rft.LeggedChain(),
+    "WaveContact": rft.WaveContact(),
+    "LinkContact": rft.LinkContact(),
+    "FunctionContact": rft.FunctionContact(
+        function=lambda s, phase: 1.0 + 0 * s * phase
+    ),
+    "Touching": rft.Touching(Chain(), rft.WaveContact()),
     "SkinFriction": rft.SkinFriction(),
     "EndCaps": rft.EndCaps(0.06),
     "DepthProfile": rft.DepthProfile(),
@@ -164,6 +171,12 @@ RIGHT = {  # what looks wrong and is not
         (name, "length", "None")
         for name in ("Chain", "Backbone", "Serpenoid", "ConstantCurvature", "Positions")
     ),
+    ("LeggedChain", "phases", "None"),
+    ("Swimmer", "contact", "None"),
+    *itertools.product(("WaveContact", "LinkContact"), ("width",), ("None",)),
+    ("FunctionContact", "width", "None"),
+    ("LeggedChain", "length", "None"),
+    ("LeggedChain", "lengths", "list"),
     *(
         (name, "length", "None")
         for name in ("no-slip-snake", "ideal-fluid-swimmer", "floating-chain")

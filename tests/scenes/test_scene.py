@@ -74,7 +74,7 @@ BAD = [  # beside those of tests/data/refusals.txt
     ("gait = 3" + GOOD.split("[gait]")[0], "gait must be a table"),
     (
         GOOD + "[water]\nx = 1",
-        "table: 'water' is unknown: use one of medium, body, effects, system, gait",
+        "table: 'water' is unknown: use one of medium, body, contact, effects, system, gait",
     ),
     (
         GOOD.replace("C = 1.8", 'C = "big"'),

@@ -106,8 +106,8 @@ class Swimmer:
     medium: rft.Medium
     body: rft.Body
     effects: tuple[rft.effects.Effect, ...] = ()
-    contact: ContactRule | None = None
     solver: Solver = field(default=Solver())
+    contact: ContactRule | None = None
 
     kind = "swimmer"
 
