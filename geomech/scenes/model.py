@@ -14,7 +14,9 @@ import rft
 from geomech.core.errors import choose
 from geomech.mathematics.gaits import KINDS as GAITS
 from geomech.mathematics.gaits import Gait
+from geomech.mathematics.gaits.wound import unwound, wound_for
 from geomech.mathematics.geometry.gait import checked_gait
+from geomech.mathematics.geometry.periods import checked_periods, winding
 from geomech.mathematics.systems import KINDS as SYSTEMS
 from geomech.mathematics.systems.base import (
     Cycle,
@@ -69,6 +71,9 @@ class SceneRepr:
 class Scene(SceneRepr):
     """A system and a gait.
 
+    Where the last shape variables of the system have periods and the gait moves only
+    the others, these advance with the phase (`geomech.mathematics.gaits.Wound`).
+
     numerics: of the tiers; the system has its own. name: of a built-in scene, or of the
     file. text: the TOML from which the scene was read, or "". `geomech.scenes.write`
     uses it only where it still describes the scene. files: further files from which it
@@ -104,7 +109,11 @@ class Scene(SceneRepr):
             _check_types(self)
             gait = checked_gait(self.gait)
             object.__setattr__(self, "system", as_system(self.system, gait.joints))
+            periods = checked_periods(self.system.traits.periods, self.system.joints)
+            gait = wound_for(gait, self.system.joints, periods)
+            object.__setattr__(self, "gait", gait)
             _check_joints(self.system, gait)
+            winding(gait, periods)  # refuses a gait that does not close
             frequency_of(self.system, self.gait)
             object.__setattr__(self, "system", reframed(self.system, self.numerics))
             self.note_turns(self.gait)
@@ -156,6 +165,13 @@ class Scene(SceneRepr):
                 parts["system"] = dataclasses.replace(system, **of_system)
             return dataclasses.replace(self, **parts)
 
+    def fitting_gait(self, gait: Gait) -> Gait:
+        """Return a gait of all variables of the system: with variables that have a
+        period advancing, where it moves only the others
+        (`geomech.mathematics.gaits.Wound`)."""
+        gait = checked_gait(gait)
+        return wound_for(gait, self.system.joints, self.system.traits.periods)
+
     def in_medium(self, medium: rft.Medium) -> Scene:
         """Return the scene of a swimmer in another medium, which alone is checked: no
         other part of a scene depends on it."""
@@ -173,7 +189,7 @@ class Scene(SceneRepr):
         work: bool = False,
     ) -> Cycle:
         """Run a gait, by default the scene's, for amplitudes (...,), all at once."""
-        gait = checked_gait(self.gait if gait is None else gait)
+        gait = self.fitting_gait(self.gait if gait is None else gait)
         alpha, alphadot = gait.cycle(phases or self.numerics.phases, amplitudes)
         return self.system.run(alpha, alphadot, work)
 
@@ -195,7 +211,8 @@ def _field_names(value: Any) -> list[str]:
 
 
 def _check_joints(system: System, gait: Gait) -> None:
-    """Raise Refusal if a gait moves another number of joints than a system has."""
+    """Raise Refusal if a gait moves another number of joints than a system has, without
+    those that advance by themselves."""
     if gait.joints == system.joints:
         return
     owner = f"the {kind_of(system)}"
@@ -206,9 +223,9 @@ def _check_joints(system: System, gait: Gait) -> None:
             "give the body one link more than the gait has joints, or as many modes, "
             "or use another gait"
         )
+    kind = type(unwound(gait)).__name__.lower()
     raise Refusal(
-        f"[gait] {type(gait).__name__.lower()} moves {gait.joints} joints, but "
-        f"{owner} has {system.joints}",
+        f"[gait] {kind} moves {gait.joints} joints, but {owner} has {system.joints}",
         instead=cure,
     )
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from geomech.mathematics.gaits import Circle, Gait
+from geomech.mathematics.gaits.wound import unwound
 from geomech.mathematics.systems.base import unwrapped
 from geomech.mathematics.systems.capabilities import solver_of
 from geomech.mathematics.systems.framed import Framed
@@ -91,7 +92,7 @@ def table(name: str, values: dict) -> str:
 
 def gait_table(gait: Gait) -> dict:
     """Return the table [gait] of a gait."""
-    return _section(gait, sections_of(Scene)["gait"].section)
+    return _section(unwound(gait), sections_of(Scene)["gait"].section)
 
 
 def medium_toml(name: str, entry) -> str:
@@ -185,7 +186,7 @@ def _written_tables(scene: Scene | Intruding | WalkerScene) -> dict:
         for name, (section, *_) in sections_of(type(scene)).items():
             # A section without a field of its own has fields of the scene as keys.
             part = getattr(scene, name, scene)
-            table = section_tables(_nameable(part), section)
+            table = section_tables(_nameable(unwound(part)), section)
             if table:
                 tables[name] = table
         if isinstance(scene, Scene):

@@ -12,6 +12,7 @@ import numpy as np
 
 from geomech.core.variables import Result, Variable
 from geomech.mathematics.gaits import Butterfly, Circle, Gait
+from geomech.mathematics.gaits.wound import unwound
 from geomech.mathematics.systems.base import System, refuse_singular
 from geomech.mathematics.systems.capabilities import near_gait
 from geomech.mathematics.systems.swimmer import is_three_link
@@ -96,7 +97,7 @@ def pair_variables(tables: SceneTables, present: set[str]) -> list[Variable]:
 
 def gait_name(gait: Gait) -> str:
     """Return the name of a kind of gait."""
-    return type(gait).__name__.lower()
+    return type(unwound(gait)).__name__.lower()
 
 
 def is_of_one_gait(variable: Variable) -> bool:
@@ -222,7 +223,7 @@ def compared_gaits(scene: Scene) -> list[Gait]:
         Circle(reverse=True, frequency=scene.frequency),
         Butterfly(frequency=scene.frequency),
     )
-    own_kind = type(scene.gait)
+    own_kind = type(unwound(scene.gait))
     return [scene.gait, *(gait for gait in added if type(gait) is not own_kind)]
 
 

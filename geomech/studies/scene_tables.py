@@ -19,8 +19,8 @@ from geomech.mathematics.gaits import Gait
 from geomech.mathematics.geometry.connection import Connection, even_part
 from geomech.mathematics.geometry.curvature import ccf
 from geomech.mathematics.geometry.curvature import error as ccf_error
-from geomech.mathematics.geometry.gait import checked_gait
 from geomech.mathematics.geometry.metric import Finsler, Metric
+from geomech.mathematics.geometry.periods import Periods, periodic_axes, winding
 from geomech.mathematics.geometry.representations.field import Field, inside
 from geomech.mathematics.geometry.representations.harmonics import Harmonics
 from geomech.mathematics.geometry.representations.plane import Plane
@@ -177,7 +177,7 @@ class SceneTables:
         """Return the gait given, checked, or the scene's own."""
         if gait is None:
             return self.scene.gait
-        return checked_gait(gait)
+        return self.scene.fitting_gait(gait)
 
     def table(
         self,
@@ -491,7 +491,7 @@ class SceneTables:
         Refusal for one that makes no sense, such as a gait that leaves the field. At
         most so many amplitudes and phases are checked for that."""
         scene = self.scene
-        gait = checked_gait(scene.gait if gait is None else gait)
+        gait = self._gait(gait)
         amplitudes = real_array("amplitudes", amplitudes)
         if amplitudes.ndim != 1:
             raise Refusal(
@@ -510,6 +510,7 @@ class SceneTables:
 
         with located(scene.name):
             frequency_of(scene.system, gait)
+            winding(gait, scene.system.traits.periods, amplitudes)  # or a refusal
             scene.note_turns(gait, amplitudes)
             checked = _evenly_sampled(np.sort(amplitudes), most_amplitudes)
             most_phases = max(most_phases, 4 * gait.harmonics)
@@ -558,6 +559,7 @@ def refuse_outside(
         phases = scene.numerics.phases
     axes = fitted.axes(system, scene.numerics)
     names = [name for name, _ in shape_labels(system)]
+    periods = system.traits.periods
     amplitudes = np.atleast_1d(gait.amplitude if amplitudes is None else amplitudes)
 
     # Of many phases a few show which amplitudes are far from leaving the field.
@@ -566,20 +568,23 @@ def refuse_outside(
 
         def may_leave(batch):
             alpha, alphadot = gait.cycle(few, batch)
-            return _may_leave(axes, alpha, alphadot)[:, None]
+            return _may_leave(axes, alpha, alphadot, periods)[:, None]
 
         near_edge = in_groups(may_leave, amplitudes, gaits_per_batch(system, few))
         amplitudes = amplitudes[near_edge[:, 0] > 0]
 
     def refuse_leaving(batch):
         alpha, _ = gait.cycle(phases, batch)
-        return inside(axes, alpha, names)[:, 0]
+        return inside(axes, alpha, names, periods)[:, 0]
 
     in_groups(refuse_leaving, amplitudes, gaits_per_batch(system, phases))
 
 
 def _may_leave(
-    axes: Sequence[np.ndarray], alpha: np.ndarray, alphadot: np.ndarray
+    axes: Sequence[np.ndarray],
+    alpha: np.ndarray,
+    alphadot: np.ndarray,
+    periods: Periods,
 ) -> np.ndarray:
     """Return whether gaits alpha, alphadot (B, N, d) may leave the field between N
     phases (B,).
@@ -590,6 +595,9 @@ def _may_leave(
     margin = step * np.abs(alphadot).max(1)
     low = np.array([axis[0] for axis in axes])
     high = np.array([axis[-1] for axis in axes])
+    around = periodic_axes(periods)  # which no gait leaves
+    low[around] = -np.inf
+    high[around] = np.inf
     below = alpha.min(1) - margin < low
     above = alpha.max(1) + margin > high
     return (below | above).any(-1)

@@ -9,6 +9,7 @@ from geomech.mathematics.gaits.points import Points
 from geomech.mathematics.gaits.polygon import Polygon
 from geomech.mathematics.gaits.shchf import Shchf
 from geomech.mathematics.gaits.waves import Sine, Wave
+from geomech.mathematics.gaits.wound import Wound
 from geomech.mathematics.geometry.gait import GAITS, Gait
 from rft.core.registry import load_all
 
@@ -29,6 +30,7 @@ __all__ = [
     "Shchf",
     "Sine",
     "Wave",
+    "Wound",
 ]
 
 

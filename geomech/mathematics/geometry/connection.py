@@ -20,6 +20,13 @@ from numpy.typing import ArrayLike
 from geomech.core import summary
 from geomech.core.face import implementation
 from geomech.core.work import Map, each
+from geomech.mathematics.geometry.periods import (
+    Periods,
+    check_axes,
+    checked_periods,
+    period_axis,
+    periodic_axes,
+)
 from geomech.mathematics.geometry.representations.field import (
     UNKNOWN_UNIT,
     Field,
@@ -54,7 +61,8 @@ class Connection:
     singular, or have a neighbour beyond singular shapes. direction_error: (3, d, N_1,
     ..., N_d), estimated error of A from the finite number of directions; None where it
     is not known. unit: of lengths, "BL" (body lengths) or "m". length: of the body in
-    that unit; None where it is unknown.
+    that unit; None where it is unknown. periods: of the shape variables, as in
+    `geomech.mathematics.geometry.representations.field.Field`.
 
     Examples
     --------
@@ -77,6 +85,11 @@ class Connection:
     unit: str = UNKNOWN_UNIT
     length: float | None = None
     direction_error: np.ndarray | None = None
+    periods: Periods = ()
+
+    def __post_init__(self):
+        periods = checked_periods(self.periods, len(self.axes))
+        object.__setattr__(self, "periods", periods)
 
     def __repr__(self) -> str:
         grid = summary.grid(self.axes)
@@ -117,7 +130,7 @@ class Connection:
     @cached_property
     def field(self) -> Field:
         """A as a field."""
-        return Field(self.axes, self.A, self.degree, **self.size)
+        return Field(self.axes, self.A, self.degree, **self.size, periods=self.periods)
 
     def __call__(self, alpha) -> np.ndarray:
         """Return A (..., 3, d) at shapes alpha (..., d); ValueError outside the
@@ -134,11 +147,16 @@ class Connection:
         on both ends (`field.half_grid`)."""
         arrays = (self.A, self.residual, self.speed)
         axes, arrays, degree = half_grid(self.axes, arrays, self.degree, first)
-        return Connection(axes, *arrays, degree, **self.size)
+        return Connection(axes, *arrays, degree, **self.size, periods=self.periods)
 
 
-def grid(joints: int, points: int = 31, extent: float = 2.5) -> tuple[np.ndarray, ...]:
+def grid(
+    joints: int, points: int = 31, extent: float = 2.5, periods: Periods = ()
+) -> tuple[np.ndarray, ...]:
     """Return ``joints`` equal axes of ``points`` angles from -extent to extent (rad).
+
+    The axis of a variable with a period covers that period, from 0, whatever the
+    extent. periods: of each variable, None for one without, or () for none.
 
     Examples
     --------
@@ -152,7 +170,11 @@ def grid(joints: int, points: int = 31, extent: float = 2.5) -> tuple[np.ndarray
     axis = np.linspace(-extent, extent, int(points))
     # Symmetric to the last digit, so that `fit` finds the mirror images.
     axis = (axis - axis[::-1]) / 2
-    return (axis,) * int(joints)
+    periods = checked_periods(periods, int(joints))
+    axes = [axis] * int(joints)
+    for k in periodic_axes(periods):
+        axes[k] = period_axis(periods[k], points)
+    return tuple(axes)
 
 
 def check_fit_options(degree: object, progress: object) -> None:
@@ -259,10 +281,19 @@ def sampled(
             raise Refusal(
                 f"each axis must be more than {degree} ascending angles, got {a}"
             )
+    check_axes(axes, checked_periods(traits.periods, len(axes)))
     alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
     symmetries = images(axes, unit, traits)
     return sampled_on(
-        velocity, alpha, unit, reduce, progress, symmetries, traits.singularity, map
+        velocity,
+        alpha,
+        unit,
+        reduce,
+        progress,
+        symmetries,
+        traits.singularity,
+        map,
+        traits.periods,
     )
 
 
@@ -275,9 +306,11 @@ def sampled_on(
     symmetries: Sequence[Image] = (),
     singularity: Callable | None = None,
     map: Map = each,
+    periods: Periods = (),
 ) -> list[np.ndarray]:
     """Return what `sampled_at` returns on a mesh of shapes alpha (N_1, ..., d); arrays
-    are (..., N_1, ...), nan where shapes are singular.
+    are (..., N_1, ...), nan where shapes are singular. periods: of the axes of the
+    mesh.
 
     Examples
     --------
@@ -299,7 +332,7 @@ def sampled_on(
     fields = sampled_at(velocity, flat, unit, reduce, progress, symmetries, masked, map)
     fields = [x.reshape(*x.shape[:-1], *alpha.shape[:-1]) for x in fields]
     if singularity is not None:
-        mask = sign_changes(singularity(alpha))
+        mask = sign_changes(singularity(alpha), periods)
         fields = [np.where(mask, np.nan, x) for x in fields]
     return fields
 
@@ -418,14 +451,15 @@ def even_part(
         return (np.sqrt((xi**2).mean(1)).T,)
 
     # The even part has none of the symmetries of the velocity.
-    singular = Traits(singularity=traits.singularity)
+    singular = Traits(singularity=traits.singularity, periods=traits.periods)
     (even,) = sampled(both_senses, axes, unit, rms, 1, traits=singular, map=map)
     return even
 
 
-def sign_changes(d: np.ndarray) -> np.ndarray:
+def sign_changes(d: np.ndarray, periods: Periods = ()) -> np.ndarray:
     """Return a mask (N_1, ..., N_d) of the grid points at which d is 0 or of another
-    sign than at a neighbour along an axis.
+    sign than at a neighbour along an axis. Both ends of an axis with a period are one
+    point.
 
     Examples
     --------
@@ -441,6 +475,10 @@ def sign_changes(d: np.ndarray) -> np.ndarray:
         along = np.moveaxis(mask, axis, 0)  # a view of the mask
         along[:-1] |= changes
         along[1:] |= changes
+    for axis in periodic_axes(periods):
+        along = np.moveaxis(mask, axis, 0)
+        along[0] |= along[-1]
+        along[-1] = along[0]
     return mask
 
 
@@ -464,14 +502,15 @@ def fit(
     left and right are alike (``halved``) half of a symmetric grid gives the other half;
     ``reversible`` halves it again where the directions allow
     (`geomech.mathematics.geometry.representations.images`); where ``singularity``
-    passes through 0 the connection is nan. Errors that ``velocity`` raises are passed
+    passes through 0 the connection is nan; the axis of a variable with one of
+    ``periods`` covers that period (`grid`). Errors that ``velocity`` raises are passed
     on.
 
     A velocity that takes one shape at a time is called for each in turn, and its result
     is broadcast. It is tried at a few shapes: `VelocityWarning` if it is not odd or not
-    homogeneous in alphadot, or ignores alpha. trusted: it is not tried. unit, length:
-    of lengths in the velocity, and of the body, as in `Connection`. map: as the
-    builtin, over batches of shapes.
+    homogeneous in alphadot, ignores alpha, or does not repeat after its periods.
+    trusted: it is not tried. unit, length: of lengths in the velocity, and of the body,
+    as in `Connection`. map: as the builtin, over batches of shapes.
 
     Examples
     --------
@@ -488,13 +527,20 @@ def fit(
     rates = directions(len(axes), count)
     has_shapes = all(a.ndim == 1 and a.size for a in axes)
     if callable(velocity) and not trusted and has_shapes:
-        velocity = checked_velocity(velocity, axes, traits.singularity is not None)
+        masked = traits.singularity is not None
+        velocity = checked_velocity(velocity, axes, masked, traits.periods)
     reduce = _with_direction_error(rates)
     *fields, error = sampled(
         velocity, axes, rates, reduce, degree, progress, traits, map
     )
     return Connection(
-        axes, *fields, degree, unit=unit, length=length, direction_error=error
+        axes,
+        *fields,
+        degree,
+        unit=unit,
+        length=length,
+        direction_error=error,
+        periods=traits.periods,
     )
 
 

@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from geomech.mathematics.geometry.connection import Connection
+from geomech.mathematics.geometry.periods import periodic_axes
 from geomech.mathematics.geometry.representations.field import Field, every_second
 from geomech.mathematics.geometry.representations.tube import Tube
 from rft.core.checks import is_whole
@@ -107,7 +108,7 @@ def ccf(connection: Connection, i: int = 1, j: int = 2) -> Field:
             values = -values
         return Field(connection.axes, values, connection.degree, **connection.size)
     values = exterior_derivative(connection, i, j) + lie_bracket(connection, i, j)
-    return Field(connection.axes, values, connection.degree, **connection.size)
+    return replace(connection.field, values=values)
 
 
 def error(connection: Connection, i: int = 1, j: int = 2) -> Field:
@@ -131,8 +132,6 @@ def error(connection: Connection, i: int = 1, j: int = 2) -> Field:
     >>> curvature.error(A).values.shape
     (3, 15, 15)
     """
-    from scipy.ndimage import maximum_filter
-
     full = ccf(connection, i, j)  # refuses what has none
     if isinstance(connection, Tube) and connection.field.joints == 2:
         return replace(full, values=connection.on_grid(connection.taylor.ccf_error))
@@ -143,16 +142,13 @@ def error(connection: Connection, i: int = 1, j: int = 2) -> Field:
     for first in (0, 1):
         half = ccf(connection.half(first), i, j)(shapes)
         differences.append(np.abs(np.moveaxis(half, -1, 0) - full.values))
-    neighbours = (1, *(3,) * len(connection.axes))
-    values = maximum_filter(np.maximum(*differences), neighbours)
+    values = _largest_nearby(np.maximum(*differences), connection)
     return replace(full, values=values)
 
 
 def _masked_error(connection: Connection, full: Field, i: int, j: int) -> Field:
     """Return `error` where there are singular shapes: nothing is interpolated between
     them, so the halves count at their own points."""
-    from scipy.ndimage import maximum_filter
-
     difference = np.zeros(full.values.shape)
     for first in (0, 1):
         points = [every_second(axis, first) for axis in connection.axes]
@@ -160,5 +156,22 @@ def _masked_error(connection: Connection, full: Field, i: int, j: int) -> Field:
         half = ccf(connection.half(first), i, j)
         half_difference = np.abs(half.values - full.values[picks])
         difference[picks] = np.fmax(difference[picks], half_difference)
-    worst = maximum_filter(difference, (1, *(3,) * len(connection.axes)))
+    worst = _largest_nearby(difference, connection)
     return replace(full, values=np.where(np.isnan(full.values), np.nan, worst))
+
+
+def _largest_nearby(values: np.ndarray, connection: Connection) -> np.ndarray:
+    """Return the largest of values (3, N_1, ..., N_d) at each grid point and its
+    neighbours, across the seam of an axis with a period as well."""
+    from scipy.ndimage import maximum_filter
+
+    joints = len(connection.axes)
+    around = periodic_axes(connection.periods)
+    distinct = [slice(None)] * values.ndim
+    modes = ["reflect"] * values.ndim
+    for k in around:
+        distinct[1 + k] = slice(-1)  # the last point is the first
+        modes[1 + k] = "wrap"
+    nearby = maximum_filter(values[tuple(distinct)], (1, *(3,) * joints), mode=modes)
+    widths = [(0, 1 if k - 1 in around else 0) for k in range(values.ndim)]
+    return np.pad(nearby, widths, mode="wrap")

@@ -10,7 +10,8 @@ each curve, and A_a = 0 is chosen. In that frame nothing turns, so the bracket i
 
     CCF = dA_t / da    per unit of a and t;
 
-Its integral over 0 .. a and one cycle is the displacement, to any order in a. Where the
+Its integral over 0 .. a and one cycle is the displacement, to any order in a, beyond
+that of the curve at 0, which moves only where the gait winds. Where the
 body has a net turn the frame does not close: it is cut at phase 0, and the turn is
 spread evenly along the curve. The only approximation is the table."""
 
@@ -26,6 +27,7 @@ from geomech.core import summary
 from geomech.core.work import Map, each
 from geomech.mathematics.geometry.connection import SAMPLES_TOGETHER, Velocity, evaluate
 from geomech.mathematics.geometry.gait import Gait, checked_gait
+from geomech.mathematics.geometry.periods import ends_differ
 from geomech.mathematics.geometry.reconstruct import displacement, turning
 from rft.core.checks import in_range, real_array
 from rft.core.refusal import Refusal
@@ -95,7 +97,8 @@ class Family:
         x, y, turn = displacement(self.xi).T
         start = self.heading[:, 0]
         at_curves = np.stack([*se2.rotated(start, x, y), turn, start], -1)
-        integral = np.zeros((*a.shape, 4))
+        at_zero = at_curves[np.flatnonzero(self.amplitudes == 0)[0]]
+        integral = np.broadcast_to(at_zero, (*a.shape, 4)).copy()
         for sign, _, spline in self._sides(at_curves):
             on_side = sign * a > 0
             integral[on_side] = spline(np.abs(a[on_side]))
@@ -135,6 +138,8 @@ def fit(
 
     xi = np.zeros((len(amplitudes), phases, 3))
     moving = np.flatnonzero(amplitudes)
+    if ends_differ(gait):  # it winds, and moves at amplitude 0 as well
+        moving = np.arange(len(amplitudes))
     step = max(1, SAMPLES_TOGETHER // phases)
     groups = [moving[k : k + step] for k in range(0, len(moving), step)]
     cycles = [gait.cycle(phases, amplitudes[group]) for group in groups]

@@ -16,7 +16,7 @@ drag length, per rad; drag is the axial drag of the whole body (`rft.work_done`)
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from functools import cached_property, partial
 
 import numpy as np
@@ -24,6 +24,7 @@ import numpy as np
 from geomech.core.work import Map, each
 from geomech.mathematics.geometry.connection import SAMPLES_TOGETHER, directions
 from geomech.mathematics.geometry.gait import Gait, checked_gait
+from geomech.mathematics.geometry.periods import Periods
 from geomech.mathematics.geometry.representations.field import Field, as_axes
 from rft.core.checks import is_whole, real_array
 from rft.core.refusal import Refusal
@@ -35,7 +36,8 @@ Power = Callable[[np.ndarray, np.ndarray], np.ndarray]
 class Metric:
     """A dissipation metric on a grid.
 
-    M: (d, d, N_1, ..., N_d), symmetric. degree: of the interpolating spline.
+    M: (d, d, N_1, ..., N_d), symmetric. degree: of the interpolating spline. periods:
+    of the shape variables, as in `Field`.
 
     Examples
     --------
@@ -48,11 +50,13 @@ class Metric:
     axes: tuple[np.ndarray, ...]
     M: np.ndarray
     degree: int = 3
+    _: KW_ONLY
+    periods: Periods = ()
 
     @cached_property
     def field(self) -> Field:
         """M as a field."""
-        return Field(self.axes, self.M, self.degree)
+        return Field(self.axes, self.M, self.degree, periods=self.periods)
 
     def norm(self, alpha, alphadot) -> np.ndarray:
         """Return F (...,) at alpha, alphadot (..., d); ValueError outside the grid."""
@@ -74,7 +78,8 @@ class Finsler:
     direction beta of alphadot.
 
     coefficients: (K + 1, N_1, N_2), the mean, then cosine and sine of 2 beta, 4 beta
-    ... K beta. residual: (N_1, N_2), rms over directions of the misfit.
+    ... K beta. residual: (N_1, N_2), rms over directions of the misfit. periods: of the
+    shape variables, as in `Field`.
 
     Examples
     --------
@@ -88,11 +93,13 @@ class Finsler:
     coefficients: np.ndarray
     residual: np.ndarray
     degree: int = 3
+    _: KW_ONLY
+    periods: Periods = ()
 
     @cached_property
     def field(self) -> Field:
         """The coefficients as a field."""
-        return Field(self.axes, self.coefficients, self.degree)
+        return Field(self.axes, self.coefficients, self.degree, periods=self.periods)
 
     def norm(self, alpha, alphadot) -> np.ndarray:
         """Return F (...,) at alpha, alphadot (..., 2); ValueError outside the grid."""
@@ -129,11 +136,13 @@ def fit(
     degree: int = 3,
     progress: Callable | None = None,
     map: Map = each,
+    periods: Periods = (),
 ) -> Metric:
     """Fit M on the grid spanned by ``axes`` exactly, from d (d + 1) / 2 powers at each
     shape.
 
-    power(alpha, alphadot) -> (...,), quadratic in alphadot.
+    power(alpha, alphadot) -> (...,), quadratic in alphadot. periods: of the shape
+    variables; the axis of one with a period covers it (`connection.grid`).
 
     Examples
     --------
@@ -158,7 +167,7 @@ def fit(
         M[i[c], i[c]] = P[c]
     for c in np.flatnonzero(i != j):
         M[i[c], j[c]] = M[j[c], i[c]] = (P[c] - M[i[c], i[c]] - M[j[c], j[c]]) / 2
-    return Metric(axes, M, degree)
+    return Metric(axes, M, degree, periods=periods)
 
 
 def fit_norm(
@@ -170,9 +179,10 @@ def fit_norm(
     *,
     highest: int = 14,
     map: Map = each,
+    periods: Periods = (),
 ) -> Finsler:
     """Fit even harmonics up to ``highest`` of a norm(alpha, alphadot) -> (...,), from
-    ``count`` directions at each shape of two joints.
+    ``count`` directions at each shape of two joints. periods: as in `fit`.
 
     Examples
     --------
@@ -197,11 +207,17 @@ def fit_norm(
         )
     unit = directions(2, count)
     F = _sampled(norm, axes, unit, progress, map)
-    return norm_from_samples(F, axes, unit, degree, highest=highest)
+    return norm_from_samples(F, axes, unit, degree, highest=highest, periods=periods)
 
 
 def norm_from_samples(
-    F: np.ndarray, axes, unit: np.ndarray, degree: int = 3, *, highest: int = 14
+    F: np.ndarray,
+    axes,
+    unit: np.ndarray,
+    degree: int = 3,
+    *,
+    highest: int = 14,
+    periods: Periods = (),
 ) -> Finsler:
     """Return the series of `fit_norm` from norms F (C, N_1, N_2) of the rates ``unit``
     (C, 2).
@@ -220,7 +236,7 @@ def norm_from_samples(
     onto = np.linalg.pinv(basis)
     coefficients = np.tensordot(onto, F, 1)
     residual = np.sqrt(((F - np.tensordot(basis, coefficients, 1)) ** 2).mean(0))
-    return Finsler(axes, coefficients, residual, degree)
+    return Finsler(axes, coefficients, residual, degree, periods=periods)
 
 
 def _sampled(

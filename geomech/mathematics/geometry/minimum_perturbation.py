@@ -95,6 +95,11 @@ def minimum_perturbation(connection: Connection) -> Frame:
             "no minimum-perturbation frame exists for a field with singular shapes",
             instead="reduce the extent so that it excludes them",
         )
+    if connection.periods:
+        raise Refusal(
+            "no minimum-perturbation frame is known for a field whose variables repeat",
+            instead="use another frame",
+        )
     basis = Basis(connection.axes, connection.degree)
     A_x, A_y, A_theta = connection.A
     w = basis.at_nodes(basis.coefficients(A_x + 1j * A_y))  # (d, nodes)

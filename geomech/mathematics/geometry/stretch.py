@@ -79,6 +79,12 @@ def stretch(metric: Metric | Finsler, points: int | None = None) -> Stretch:
             "shape space can be redrawn only as a plane",
             because=f"it needs two joints, got {len(metric.axes)}",
         )
+    if metric.periods:
+        raise Refusal(
+            "shape space can be redrawn only as a plane",
+            because="one of its variables repeats",
+            instead="draw the map as it is",
+        )
     if points is None:
         in_range("points", len(metric.axes[0]), 5, 401, whole=True)
         counts = [min(len(axis), POINTS) for axis in metric.axes]

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from geomech.mathematics.geometry.periods import checked_periods
 from rft.core.premise import NONE, SHAPE_ALONE, Premise
 
 MEAN = "mean"  # the frame at the centre of mass, with the mean heading
@@ -50,6 +51,8 @@ class Traits:
     frequency : cycles per second, where xi depends on it.
     compliant : joints give way, so that the shape is not that of the gait. The velocity
         is that of the shape which the body really takes; a run finds both.
+    periods : period of each shape variable, None for one without, or empty for none:
+        xi(alpha + period e_k, alphadot) = xi(alpha, alphadot).
     """
 
     linear: bool = False
@@ -67,6 +70,11 @@ class Traits:
     labels: tuple[tuple[str, str], ...] = ()
     frequency: float | None = None
     compliant: bool = False
+    periods: tuple[float | None, ...] = ()
+
+    def __post_init__(self):
+        periods = checked_periods(self.periods, len(self.periods))
+        object.__setattr__(self, "periods", periods)
 
     @property
     def halved(self) -> bool:

@@ -31,8 +31,12 @@ from geomech.mathematics.geometry.connection import SAMPLES_TOGETHER, Connection
 from geomech.mathematics.geometry.curvature import ccf
 from geomech.mathematics.geometry.curvature import error as ccf_error
 from geomech.mathematics.geometry.gait import Gait, checked_gait
+from geomech.mathematics.geometry.periods import ends_differ
 from geomech.mathematics.geometry.representations.field import Field
-from geomech.mathematics.geometry.representations.plane import plane_shapes
+from geomech.mathematics.geometry.representations.plane import (
+    pair_periods,
+    plane_shapes,
+)
 from rft.core.checks import in_range, real_array
 from rft.core.refusal import Refusal
 from rft.formulas import se2
@@ -71,9 +75,10 @@ class TwoForm:
         a field of two joints, for pictures."""
         at = self.field.inside(real_array("at", at))
         axes = (self.field.axes[i - 1], self.field.axes[j - 1])
+        periods = pair_periods(self.field.periods, (i, j))
         shapes = plane_shapes(axes, (i, j), at)
         values = np.moveaxis(self.pair(i, j)(shapes), -1, 0)
-        return replace(self.field, axes=axes, values=values)
+        return replace(self.field, axes=axes, values=values, periods=periods)
 
     @property
     def joints(self) -> int:
@@ -143,17 +148,29 @@ def spanned(
         raise Refusal(
             f"the gait moves {gait.joints} joints, the field has {form.joints}"
         )
-    amplitudes = _amplitudes(gait, amplitudes)
+    refuse_winding(gait)
+    amplitudes = gait_amplitudes(gait, amplitudes)
     batch = max(1, SAMPLES_TOGETHER // int(phases))
     results = []
     for k in range(0, max(1, len(amplitudes)), batch):
         group = amplitudes[k : k + batch]
         results.append(_cones(form, gait, group, int(phases), int(tips)))
     net, others = zip(*results)
-    return _with_spread(np.concatenate(net), np.concatenate(others))
+    return with_spread(np.concatenate(net), np.concatenate(others))
 
 
-def _amplitudes(gait: Gait, amplitudes) -> np.ndarray:
+def refuse_winding(gait: Gait) -> None:
+    """Refuse a gait whose ends differ, as it encloses no area."""
+    if ends_differ(gait):
+        raise Refusal(
+            "the gait ends at another angle than it starts at, and encloses no area",
+            because="it winds around a variable that repeats",
+            instead="use geomech.mathematics.geometry.loop_at_rest.wound_area, or path "
+            "or direct",
+        )
+
+
+def gait_amplitudes(gait: Gait, amplitudes) -> np.ndarray:
     """Return amplitudes (B,); the gait's own for None."""
     if amplitudes is None:
         amplitudes = gait.amplitude
@@ -176,7 +193,8 @@ def spanned_by(
     ``around`` phases."""
     in_range("phases", phases, 8, 1e6, whole=True)
     in_range("tips", tips, 0, around, whole=True)
-    amplitudes = _amplitudes(gait, amplitudes)
+    refuse_winding(checked_gait(gait))
+    amplitudes = gait_amplitudes(gait, amplitudes)
     alpha, alphadot = checked_gait(gait).cycle(int(phases), amplitudes)
     along = np.einsum("...ij,...j->...i", A(alpha), alphadot).mean(1)
 
@@ -187,7 +205,7 @@ def spanned_by(
         integral = along + _brackets(A, alpha, alphadot, tip)
         poses.append(se2.exp(2 * np.pi * integral))
     poses = np.stack(poses, 1)
-    return _with_spread(poses[:, 0], poses[:, 1:])
+    return with_spread(poses[:, 0], poses[:, 1:])
 
 
 def _tips(alpha: np.ndarray, count: int) -> list[np.ndarray]:
@@ -210,7 +228,7 @@ def _brackets(A: Callable, alpha, alphadot, tip) -> np.ndarray:
     return total
 
 
-def _with_spread(net: np.ndarray, others: np.ndarray) -> Spanned:
+def with_spread(net: np.ndarray, others: np.ndarray) -> Spanned:
     """Return the displacement with the spread of poses (B, tips, 3) from net (B, 3)."""
     difference = others - net[:, None]
     position = np.hypot(difference[..., 0], difference[..., 1])

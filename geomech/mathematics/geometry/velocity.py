@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geomech.core.errors import VelocityWarning
+from geomech.mathematics.geometry.periods import Periods, periodic_axes
 from rft.core.checks import masked_arrays, real_array
 from rft.core.refusal import Refusal
 
@@ -25,19 +26,22 @@ SAME = 1e-12  # of the velocity's rms: a smaller change with the shape is none
 
 
 def checked_velocity(
-    velocity: Callable, axes: Sequence[ArrayLike], masked: bool
+    velocity: Callable,
+    axes: Sequence[ArrayLike],
+    masked: bool,
+    periods: Periods = (),
 ) -> Callable:
     """Return the velocity, as `geomech.mathematics.geometry.connection.evaluate` takes
     it; a velocity of a single shape is called for one shape at a time.
 
     `VelocityWarning`, once for all reasons, if it is not odd or not homogeneous in
-    alphadot, or ignores alpha."""
+    alphadot, ignores alpha, or does not have its ``periods``."""
     rng = np.random.default_rng(0)
     alpha = np.stack([rng.uniform(a[0], a[-1], SHAPES) for a in axes], -1)[:, None]
     alpha, rates = np.broadcast_arrays(alpha, rng.normal(size=(RATES, len(axes))))
     velocity = in_batches(velocity, alpha, rates)
 
-    def values(rates):
+    def values(rates, alpha=alpha):
         xi = np.asarray(velocity(alpha, rates), float)
         return np.broadcast_to(xi, (SHAPES, RATES, 3))
 
@@ -45,6 +49,11 @@ def checked_velocity(
         xi = values(rates)
         backwards = values(-rates)
         twice = values(2 * rates)
+        periods_later = []
+        for k in periodic_axes(periods):
+            later = alpha.copy()
+            later[..., k] += periods[k]
+            periods_later.append((k, values(rates, later)))
     except ValueError:
         # Of another shape, or refused at these shapes: the fit itself says so in full.
         return velocity
@@ -55,6 +64,13 @@ def checked_velocity(
     if scale == 0:
         return velocity
     faults = _faults(xi, backwards, twice, good, scale)
+    for k, later in periods_later:
+        deviation = np.nanmax(np.abs((later - xi)[good])) / scale
+        if deviation > TOLERANCE:
+            faults.append(
+                f"is another by {deviation:.2g} of its size after the period "
+                f"{periods[k]:.6g} of alpha_{k + 1}"
+            )
     if faults:
         warnings.warn(
             f"this velocity {'; it '.join(faults)}", VelocityWarning, stacklevel=3

@@ -12,6 +12,7 @@ import numpy as np
 
 from geomech.core import summary
 from geomech.core.errors import check_angle
+from geomech.mathematics.geometry.periods import checked_periods
 from geomech.mathematics.geometry.reconstruct import displacement
 from geomech.mathematics.geometry.traits import NOTHING, Traits, unit_of
 from geomech.mathematics.geometry.velocity import evaluate, in_batches
@@ -154,6 +155,7 @@ class WrappedSystem:
             in_range("length", self.length, 1e-9, 1e9)
         if not isinstance(self.traits, Traits):
             raise Refusal("traits must be Traits(...)", value=self.traits)
+        checked_periods(self.traits.periods, self.joints)
         if not _accepts_two(self._velocity):
             raise Refusal(f"the velocity of {self.kind} must accept (alpha, alphadot)")
 
@@ -231,6 +233,9 @@ def as_system(system: Any, joints: int | None = None) -> System:
             )
         return system
     function = getattr(system, "velocity", system)
+    traits = getattr(system, "traits", NOTHING)
+    if isinstance(traits, Traits) and traits.periods:
+        joints = len(traits.periods)
     joints = getattr(system, "joints", joints)
     if isinstance(system, type) or not callable(function) or joints is None:
         raise Refusal(
@@ -243,7 +248,7 @@ def as_system(system: Any, joints: int | None = None) -> System:
         system,
         joints,
         getattr(system, "length", None),
-        getattr(system, "traits", NOTHING),
+        traits,
     )
 
 

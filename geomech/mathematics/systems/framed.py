@@ -69,6 +69,12 @@ class Framed:
                 "which has singular shapes",
                 instead="remove frame",
             )
+        if self.inner.traits.periods:
+            raise Refusal(
+                f"no minimum-perturbation frame is known for the {kind_of(self.inner)},"
+                " which has shape variables that repeat",
+                instead="remove frame",
+            )
         if stored_table(self.inner, "connection"):
             raise Refusal(
                 "a table keeps the frame in which it was computed",

@@ -11,6 +11,7 @@ import numpy as np
 from geomech.core.setting import Setting
 from geomech.mathematics.geometry import family
 from geomech.mathematics.geometry.family import Family
+from geomech.mathematics.geometry.periods import ends_differ
 from geomech.mathematics.tiers.base import Plan, Table, Tier, solved_phases
 from rft.core.checks import real_array
 from rft.core.premise import SHAPE_ALONE
@@ -28,6 +29,8 @@ def table(system, numerics, gait, amplitudes) -> Table:
     phases = numerics.phases // 2
     ends = np.array([a for a in (least, largest) if a])
     curves = np.outer(ends, np.arange(1, count + 1) / count).ravel()
+    if ends_differ(gait):  # so that it moves at amplitude 0 as well
+        curves = np.append(curves, 0.0)
     return Table(
         "family",
         key=(numerics.curves, numerics.phases, gait, least, largest),
@@ -42,9 +45,12 @@ def _build(
     system, gait, least, largest, count, phases, progress: Callable | None
 ) -> Family:
     """Return the family of a gait from the amplitude least to largest."""
-    if least == largest:  # both are 0: rest alone
-        return Family(gait, np.zeros(1), np.zeros((1, phases, 3)))
     velocity = partial(_run, system)
+    if least == largest:  # both are 0: rest alone
+        xi = np.zeros((1, phases, 3))
+        if ends_differ(gait):
+            xi = velocity(*gait.cycle(phases, np.zeros(1)))
+        return Family(gait, np.zeros(1), xi)
     return family.fit(velocity, gait, largest, count, phases, progress, least=least)
 
 

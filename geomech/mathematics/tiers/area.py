@@ -1,5 +1,8 @@
 """The area tier: exp of the CCF's integral over the enclosed area.
 
+A gait that winds around a variable with a period encloses none: it is compared with the
+loop at rest (`geomech.mathematics.geometry.loop_at_rest`).
+
 Winding numbers count, so figure-eights cancel. A loop of three and more joints encloses
 no area but spans surfaces; how much the result depends on their choice is reported."""
 
@@ -12,8 +15,16 @@ from geomech.mathematics.gaits import Gait
 from geomech.mathematics.geometry.connection import SAMPLES_TOGETHER
 from geomech.mathematics.geometry.curvature import ccf
 from geomech.mathematics.geometry.gait import checked_gait
+from geomech.mathematics.geometry.loop_at_rest import NODES, wound_area
+from geomech.mathematics.geometry.periods import winding
 from geomech.mathematics.geometry.representations.field import Field
-from geomech.mathematics.geometry.two_form import RADII, spanned, spanned_by, two_form
+from geomech.mathematics.geometry.two_form import (
+    RADII,
+    refuse_winding,
+    spanned,
+    spanned_by,
+    two_form,
+)
 from geomech.mathematics.tiers import fitted
 from geomech.mathematics.tiers.base import Plan, Tier, in_groups
 from rft.core.checks import in_range
@@ -43,13 +54,15 @@ def area(field: Field, gait: Gait, amplitudes=None, phases: int = 256) -> np.nda
             "the area tier needs two joints, got a field of"
             f" {field.joints} and a gait of {gait.joints}"
         )
+    refuse_winding(gait)
     if amplitudes is None:
         amplitudes = gait.amplitude
     potential = field.antiderivative(0)
 
     def enclosed(batch):
         alpha, alphadot = gait.cycle(phases, batch)
-        integrand = potential(field.inside(alpha)) * alphadot[..., 1:]
+        field.inside(alpha)
+        integrand = potential(alpha) * alphadot[..., 1:]
         return se2.exp(integrand.mean(-2) * 2 * np.pi)
 
     return in_groups(enclosed, amplitudes, SAMPLES_TOGETHER // phases)
@@ -63,6 +76,9 @@ def _plan(system, numerics, gait, amplitudes) -> Plan:
     components = 3 * (d * (d - 1) // 2)
     read = components * (numerics.interpolation + 1) ** d
     numbers = components * numerics.grid**d
+
+    if winding(gait, system.traits.periods, amplitudes):
+        return _wound_plan(system, numerics, gait, numbers, read)
 
     if d == 2:
 
@@ -87,6 +103,35 @@ def _plan(system, numerics, gait, amplitudes) -> Plan:
     )
 
 
+def _wound_plan(system, numerics, gait, numbers: int, read: int) -> Plan:
+    """Return the plan of a gait that winds around variables with periods: the line
+    integral along the loop at rest, and the strip from there to the gait.
+
+    numbers, read: entries of `Plan`."""
+    if fitted.is_too_large(system, numerics):
+        raise Refusal(
+            "the area of a gait that winds around a variable with a period needs a "
+            f"field, and one of {numerics.grid}^{system.joints} shapes is too large",
+            instead=f"lower [numerics] grid, to {fitted.finest_grid(system.joints)} or "
+            "less, or use path or direct",
+        )
+
+    def strips(table, amplitudes, tips):
+        return wound_area(table, gait, amplitudes, numerics.phases, tips)
+
+    nodes = RADII
+    if system.joints == 2:
+        nodes = NODES
+    return _surface_plan(
+        strips,
+        gait,
+        has_choice=system.joints > 2,
+        table=fitted.table(system, numerics),
+        numbers=numbers,
+        read=read * nodes,
+    )
+
+
 def _plan_without_field(system, numerics, gait) -> Plan:
     """Return the plan of a loop of many joints, with A solved on its surfaces alone."""
     A = fitted.without_field(system, numerics)
@@ -103,11 +148,12 @@ def _plan_without_field(system, numerics, gait) -> Plan:
     return _surface_plan(surfaces, gait, balances=balances)
 
 
-def _surface_plan(surfaces, gait, **plan) -> Plan:
-    """Return the plan of a loop of three and more joints.
+def _surface_plan(surfaces, gait, has_choice: bool = True, **plan) -> Plan:
+    """Return the plan of a loop of three and more joints, or of one that winds.
 
     surfaces: function of (table, amplitudes, tips), which returns a
-    `geomech.mathematics.geometry.two_form.Spanned`. plan: other entries of `Plan`."""
+    `geomech.mathematics.geometry.two_form.Spanned`. has_choice: whether there is more
+    than one surface. plan: other entries of `Plan`."""
 
     def predict(table, amplitudes):
         shape = np.shape(amplitudes)
@@ -118,6 +164,8 @@ def _surface_plan(surfaces, gait, **plan) -> Plan:
     def spread(table, amplitudes):
         return surfaces(table, amplitudes, TIPS).spread
 
+    if not has_choice:
+        return Plan(predict, **plan)
     return Plan(predict, spread=spread, **plan)
 
 

@@ -11,14 +11,17 @@ import numpy as np
 
 from geomech.mathematics.geometry import connection
 from geomech.mathematics.geometry.connection import Connection
+from geomech.mathematics.geometry.periods import Periods
 from geomech.mathematics.geometry.representations.field import inside
 from geomech.mathematics.geometry.representations.images import (
     images,
-    mirrored,
+    plane_images,
     to_solve,
 )
 from geomech.mathematics.geometry.representations.plane import (
     Plane,
+    checked_pair,
+    indices,
     interpolated_plane,
     plane_shapes,
 )
@@ -86,7 +89,7 @@ def axes(system: System, numerics: Numerics) -> tuple[np.ndarray, ...]:
             f"{what} ({gigabytes:.3g} GB for A)",
             instead=f"lower [numerics] grid, to {finest_grid(d)} or less, {INSTEAD}",
         )
-    return connection.grid(d, n, numerics.extent)
+    return connection.grid(d, n, numerics.extent, system.traits.periods)
 
 
 def finest_grid(joints: int) -> int:
@@ -181,12 +184,14 @@ def plane(
     stored = stored_table(system, "connection")
     if stored:
         return interpolated_plane(stored, pair, at)
-    axis = connection.grid(1, numerics.grid, numerics.extent)[0]
+    axes = connection.grid(
+        system.joints, numerics.grid, numerics.extent, system.traits.periods
+    )
     names = [name for name, _ in shape_labels(system)]
-    at = inside((axis,) * system.joints, at, names)
+    at = inside(axes, at, names, system.traits.periods)
     return fit_plane(
         system.velocity,
-        (axis, axis),
+        [axes[k] for k in indices(checked_pair(pair, system.joints))],
         pair,
         at,
         directions(system, numerics),
@@ -205,12 +210,12 @@ def plane_balances(
     if stored_table(system, "connection"):
         return 0
     count = directions(system, numerics)
-    axis = connection.grid(1, numerics.grid, numerics.extent)[0]
-    alpha = plane_shapes((axis, axis), pair, np.asarray(at)).reshape(-1, system.joints)
-    symmetries = []
-    if system.traits.halved:
-        symmetries = mirrored(alpha, count)
-    return int(to_solve(symmetries, len(alpha)).sum()) * count
+    axes = connection.grid(
+        system.joints, numerics.grid, numerics.extent, system.traits.periods
+    )
+    alpha = plane_shapes([axes[k] for k in indices(pair)], pair, np.asarray(at))
+    symmetries = plane_images(alpha, count, system.traits, pair)
+    return int(to_solve(symmetries, alpha[..., 0].size).sum()) * count
 
 
 def solved_shapes(system: System, numerics: Numerics, count: int) -> int:
@@ -224,19 +229,26 @@ def solved_shapes(system: System, numerics: Numerics, count: int) -> int:
         count,
         system.traits.halved,
         system.traits.reversible,
+        system.traits.periods,
     )
 
 
 @lru_cache
 def _solved_shapes(
-    joints: int, points: int, count: int, mirror: bool, reversible: bool
+    joints: int,
+    points: int,
+    count: int,
+    mirror: bool,
+    reversible: bool,
+    periods: Periods,
 ) -> int:
     """Return `solved_shapes` from the facts that it depends on."""
     if points**joints > LARGEST_GRID:  # refused before it is solved
         if mirror:
             return points**joints // 2
         return points**joints
-    grid = connection.grid(joints, points)
+    grid = connection.grid(joints, points, periods=periods)
     unit = connection.directions(joints, count)
-    symmetries = images(grid, unit, Traits(mirror=mirror, reversible=reversible))
+    traits = Traits(mirror=mirror, reversible=reversible, periods=periods)
+    symmetries = images(grid, unit, traits)
     return int(to_solve(symmetries, points**joints).sum())

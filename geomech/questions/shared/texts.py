@@ -111,7 +111,10 @@ def no_degrees_of_amplitude(scene: Any) -> str | None:
     is an angle."""
     if is_angle(scene.gait, "amplitude"):
         return None
-    return f"the amplitude of a {type(scene.gait).__name__.lower()} is not an angle"
+    from geomech.mathematics.gaits.wound import unwound
+
+    kind = type(unwound(scene.gait)).__name__.lower()
+    return f"the amplitude of a {kind} is not an angle"
 
 
 def no_degrees_of(scene: Any, parameter: str) -> str | None:
@@ -151,9 +154,10 @@ def parts_of(scene: Any, section: str) -> list[Any]:
 
 def is_angle(part: Any, key: str) -> bool:
     """Return whether a key of a part of a scene is an angle."""
+    from geomech.mathematics.gaits.wound import unwound
     from geomech.scenes.format.key import angles_of
 
-    kind: Any = type(part)
+    kind: Any = type(unwound(part))
     return key in angles_of(kind)
 
 

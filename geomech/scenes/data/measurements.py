@@ -10,6 +10,7 @@ import numpy as np
 
 from geomech.io import rows
 from geomech.io.rows import plain, split_unit
+from geomech.mathematics.gaits.wound import unwound
 from geomech.mathematics.systems.base import body_size, length_unit
 from geomech.scenes.format.columns import LARGEST_FILE
 from geomech.scenes.format.key import angles_of
@@ -44,7 +45,7 @@ def read(path: str | Path, scene: Scene, angle: bool = False) -> dict[str, np.nd
     are headings. Refusal, with the line, for any other file."""
     source = rows.read(path, LARGEST_FILE, f"give a CSV file with the header {HEADER}")
     length = body_size(scene.system)
-    in_angles = "amplitude" in angles_of(type(scene.gait))
+    in_angles = "amplitude" in angles_of(type(unwound(scene.gait)))
     units = units_of(in_angles, length_unit(scene.system), length, angle)
     scales = _scales(source.words, units, source.place, scene.name)
     table = source.numbers(source.words)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from geomech.mathematics.gaits import KINDS
+from geomech.mathematics.gaits.wound import unwound
 from geomech.mathematics.systems import premises
 from geomech.mathematics.systems.base import System
 from geomech.mathematics.tiers import TIERS
@@ -49,9 +50,9 @@ def description(scene: Scene | Intruding | WalkerScene) -> str:
 def scene_lines(scene: Scene) -> list[str]:
     """Return the scene's system, its gait and its engine."""
     first, *rest = system_lines(scene.system)
-    gait = type(scene.gait).__name__
+    gait = type(unwound(scene.gait)).__name__
     for name, kind in KINDS.items():
-        if type(scene.gait) is kind:
+        if type(unwound(scene.gait)) is kind:
             gait = name
     words = f"{in_line(scene.name)}: {first}, {gait} gait"
     if scene.frequency is not None:

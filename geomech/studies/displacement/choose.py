@@ -11,7 +11,6 @@ import numpy as np
 
 from geomech.core.variables import Result, Variable
 from geomech.mathematics.gaits import Gait
-from geomech.mathematics.geometry.gait import checked_gait
 from geomech.mathematics.systems.base import body_size
 from geomech.mathematics.systems.capabilities import (
     pieces_per_length,
@@ -110,7 +109,7 @@ def cheapest_displacements(
 
     start = time.perf_counter()
     study = SceneTables(scene)
-    gait = checked_gait(scene.gait if gait is None else gait)
+    gait = scene.fitting_gait(scene.gait if gait is None else gait)
     amplitudes = _checked_amplitudes(scene, amplitudes)
     request = _Request(study, gait, amplitudes, tol, allow)
     scene.note_turns(gait, amplitudes)

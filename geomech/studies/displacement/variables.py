@@ -11,6 +11,7 @@ import numpy as np
 from geomech.core.variables import Result, Variable
 from geomech.mathematics.gaits import Gait
 from geomech.mathematics.geometry.gait import loop_area
+from geomech.mathematics.geometry.periods import ends_differ
 from geomech.mathematics.geometry.symmetry import zero_components
 from geomech.mathematics.systems.base import body_size, length_unit
 from geomech.scenes.model import Scene, frequency_of
@@ -180,6 +181,8 @@ def _loop_area(gait: Gait, phases: int, amplitudes: np.ndarray) -> Variable:
     """Return the area of a gait's loop in shape space at each amplitude."""
     area, error = loop_area(gait, phases, amplitudes)
     label = "area in shape space, counter-clockwise positive"
+    if ends_differ(gait):
+        label = f"{label}, between the loop at rest and the gait"
     return Variable("loop_area", ("amplitude",), area, "rad2", label, error)
 
 

@@ -24,7 +24,6 @@ import numpy as np
 from geomech.core.variables import Result, Variable
 from geomech.mathematics.gaits import Gait
 from geomech.mathematics.geometry import connection, metric
-from geomech.mathematics.geometry.gait import checked_gait
 from geomech.mathematics.geometry.metric import Finsler, Metric
 from geomech.mathematics.geometry.representations.harmonics import Harmonics
 from geomech.mathematics.systems.base import System, body_size, kind_of
@@ -132,15 +131,23 @@ def fit_metric(
 
     grid = axes(system, numerics)
     degree = numerics.interpolation
+    periods = system.traits.periods
     own = capability(system, OwnMetric)
     if own is not None:
-        return metric.fit(own.squared_speed, grid, degree, progress)
+        return metric.fit(own.squared_speed, grid, degree, progress, periods=periods)
     if is_quadratic(system):
-        return metric.fit(partial(power, system), grid, degree, progress)
+        power_of = partial(power, system)
+        return metric.fit(power_of, grid, degree, progress, periods=periods)
     norm = partial(_norm_at, system)
     count = harmonic.directions(system, numerics)
     return metric.fit_norm(
-        norm, grid, count, degree, progress, highest=HIGHEST_HARMONIC
+        norm,
+        grid,
+        count,
+        degree,
+        progress,
+        highest=HIGHEST_HARMONIC,
+        periods=periods,
     )
 
 
@@ -155,6 +162,7 @@ def shares_velocities(system: System) -> bool:
     table."""
     has_other_source = (
         system.traits.linear
+        or system.traits.periods  # whose axes have ends that are solved once
         or capability(system, OwnMetric) is not None
         or stored_table(system, "connection")
     )
@@ -253,7 +261,7 @@ def effort(
     by later cycles are not included. Path lengths are nan where power has no one degree
     in the rate. Refusal where the cost of moving is unknown."""
     system = scene.system
-    gait = checked_gait(scene.gait if gait is None else gait)
+    gait = scene.fitting_gait(scene.gait if gait is None else gait)
     if amplitudes is None:
         amplitudes = [gait.amplitude]
     amplitudes = real_array("amplitudes", amplitudes).ravel()

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geomech.mathematics.gaits import Sine, Wave
+from geomech.mathematics.gaits.wound import unwound
 from geomech.mathematics.systems.base import body_size, kind_of
 from geomech.mathematics.systems.capabilities import Loaded, capability
 from geomech.studies.realised import true_shape
@@ -120,7 +121,7 @@ class BodyWave(NamedTuple):
 def _known_wave(scene: Scene, amplitudes: np.ndarray) -> BodyWave | None:
     """Return the wave of a gait whose wavelength is known: a `Sine`, or a `Wave` about
     the straight chain of equal links. None for other gaits and bodies."""
-    gait = scene.gait
+    gait = unwound(scene.gait)
     if isinstance(gait, Wave):
         body = getattr(scene.system, "body", None)
         equal_links = len({*getattr(body, "lengths", ())}) == 1 and body.modes is None
@@ -327,7 +328,7 @@ def refined(scene: Scene, finer: int) -> Scene:
     >>> refined(load("sandfish-loose"), 2).system.body.elements
     200
     """
-    gait = getattr(scene, "gait", scene)
+    gait = unwound(getattr(scene, "gait", scene))
     if not isinstance(gait, Sine):
         kind = type(gait).__name__.lower()
         raise Refusal(

@@ -457,6 +457,12 @@ def _loops(
     """Return the loops to search; Refusal for options that the scene's gait has not."""
     gait = scene.gait
     joints = scene.system.joints
+    if scene.system.traits.periods:
+        raise Refusal(
+            f"a search over loops of the {kind_of(scene.system)} is not possible",
+            because="one of its shape variables repeats, and its gaits wind around it",
+            instead="sweep parameters of the gait ('geomech sweep')",
+        )
     if isinstance(gait, Sine):
         for name, value in (("harmonics", harmonics), ("limits", limits)):
             if value is not None:

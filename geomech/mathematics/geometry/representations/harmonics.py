@@ -19,7 +19,7 @@ times the root of its multinomial coefficient, fitted by least squares."""
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from functools import cached_property, lru_cache
 from itertools import combinations
 from math import comb, factorial, prod
@@ -34,6 +34,7 @@ from geomech.mathematics.geometry.connection import (
     directions,
     sampled,
 )
+from geomech.mathematics.geometry.periods import Periods
 from geomech.mathematics.geometry.representations.field import Field, as_axes, half_grid
 from geomech.mathematics.geometry.traits import NOTHING, Traits
 from rft.core.checks import in_range, is_whole, real_array
@@ -49,12 +50,14 @@ class Harmonics:
     coefficients: (3, 2 K, N_1, N_2), a_1, b_1, a_3, b_3 ... of each component of xi, in
     the velocity's units and frame; for more joints (3, terms, N_1, ..., N_d), of
     `powers`. residual: (3, N_1, ..., N_d), rms over directions of the misfit of the
-    series."""
+    series. periods: of the shape variables, as in `Field`."""
 
     axes: tuple[np.ndarray, ...]
     coefficients: np.ndarray
     residual: np.ndarray
     degree: int = 3
+    _: KW_ONLY
+    periods: Periods = ()
 
     def __repr__(self) -> str:
         speed = np.sqrt((self.coefficients**2).sum(1) / 2)
@@ -65,7 +68,7 @@ class Harmonics:
     @cached_property
     def field(self) -> Field:
         """The coefficients as a field."""
-        return Field(self.axes, self.coefficients, self.degree)
+        return Field(self.axes, self.coefficients, self.degree, periods=self.periods)
 
     @property
     def highest(self) -> int:
@@ -80,7 +83,7 @@ class Harmonics:
         """Return the harmonics on half of the grid, as `Connection.half` does."""
         arrays = (self.coefficients, self.residual)
         axes, arrays, degree = half_grid(self.axes, arrays, self.degree, first)
-        return Harmonics(axes, *arrays, degree)
+        return Harmonics(axes, *arrays, degree, periods=self.periods)
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
         """Return xi (..., 3) at alpha, alphadot (..., d); ValueError outside the
@@ -198,4 +201,4 @@ def fit(
         return coefficients, residual_scale * np.sqrt((misfit**2).mean(1)).T
 
     fields = sampled(velocity, axes, unit, reduce, degree, progress, traits, map)
-    return Harmonics(axes, *fields, degree)
+    return Harmonics(axes, *fields, degree, periods=traits.periods)

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from geomech.mathematics.geometry.gait import Gait
+from geomech.mathematics.geometry.periods import periodic_axes
 from geomech.mathematics.geometry.traits import Traits
 
 # Largest difference of two equal directions and, relative to the largest of a gait, of
@@ -47,43 +48,85 @@ class Image(NamedTuple):
 def images(axes: Sequence[np.ndarray], unit: np.ndarray, traits: Traits) -> list[Image]:
     """Return the symmetries that a grid and directions (C, d) have, for a body whose
     left and right (``traits.halved``), head and tail (``traits.reversible``) are
-    alike."""
+    alike. Both ends of an axis with a period (``traits.periods``) are images of each
+    other, and an image of the axis may lie whole periods away."""
     counts = [len(a) for a in axes]
     index = np.arange(np.prod(counts)).reshape(counts)
+    periods = traits.periods or (None,) * len(axes)
     backwards = axes[::-1]
+    periods_backwards = periods[::-1]
 
-    # Axes, indices and directions of the image, and the signs of its velocity.
+    # Axes and periods, indices and directions of the image, and the signs of its
+    # velocity.
     moves = []
     if traits.halved:
         mirrored_axes = [-a[::-1] for a in axes]
-        moves.append((mirrored_axes, np.flip(index), -unit, MIRROR))
+        moves.append((mirrored_axes, periods, np.flip(index), -unit, MIRROR))
     if traits.reversible:
         reversed_axes = [-a[::-1] for a in backwards]
         reversed_unit = -unit[:, ::-1]
+        signs = (-1.0, -1.0, 1.0)
         moves.append(
-            (reversed_axes, np.flip(index).T, reversed_unit, (-1.0, -1.0, 1.0))
+            (reversed_axes, periods_backwards, np.flip(index).T, reversed_unit, signs)
         )
     if traits.halved and traits.reversible:
-        moves.append((backwards, index.T, unit[:, ::-1], (-1.0, 1.0, -1.0)))
+        signs = (-1.0, 1.0, -1.0)
+        moves.append((backwards, periods_backwards, index.T, unit[:, ::-1], signs))
 
     result = []
-    for image_axes, image_index, image_unit, signs in moves:
-        if not all(map(np.array_equal, axes, image_axes)):
+    for image_axes, image_periods, image_index, image_unit, signs in moves:
+        if image_periods != periods:
+            continue
+        if not all(map(_is_same_axis, axes, image_axes, periods)):
             continue
         matched = _matched(unit, image_unit)
         if matched is not None:
             source, sign = matched
             result.append(Image(image_index.ravel(), source, sign * np.array(signs)))
-    return result
+    return _with_ends(result, index, periodic_axes(periods), len(unit))
 
 
-def mirrored(alpha: np.ndarray, count: int) -> list[Image]:
-    """Return the image that mirrors shapes (S, d), for ``count`` directions; [] where
-    the mirror images are not the same shapes in reverse order."""
-    if not np.array_equal(alpha, -alpha[::-1]):
-        return []
-    index = np.arange(len(alpha))[::-1]
-    return [Image(index, np.arange(count), np.array([[-1.0, 1.0, 1.0]]))]
+def plane_images(
+    alpha: np.ndarray, count: int, traits: Traits, pair: tuple[int, int]
+) -> list[Image]:
+    """Return the symmetries of the shapes alpha (N_i, N_j, d) of a plane of two joints,
+    counted from 1, for ``count`` directions: the mirror (``traits.halved``) where the
+    mirror images are the same shapes in reverse order, and both ends of an axis with a
+    period."""
+    periods = traits.periods or (None,) * alpha.shape[-1]
+    index = np.arange(alpha.shape[0] * alpha.shape[1]).reshape(alpha.shape[:2])
+    result = []
+    if traits.halved:
+        shapes = alpha.reshape(-1, alpha.shape[-1])
+        if all(map(_is_same_axis, shapes.T, -shapes[::-1].T, periods)):
+            signs = np.array([[-1.0, 1.0, 1.0]])
+            result.append(Image(index.ravel()[::-1], np.arange(count), signs))
+    around = [k for k, joint in enumerate(pair) if periods[joint - 1] is not None]
+    return _with_ends(result, index, around, count)
+
+
+def _is_same_axis(a: np.ndarray, b: np.ndarray, period: float | None) -> bool:
+    """Return whether two rows of angles are the same shapes, one by one."""
+    if period is None:
+        return np.array_equal(a, b)
+    turns = (a - b) / period
+    return bool(np.abs(turns - np.round(turns)).max(initial=0.0) <= SAME)
+
+
+def _with_ends(
+    symmetries: list[Image], index: np.ndarray, around: Sequence[int], count: int
+) -> list[Image]:
+    """Return images with those that exchange both ends of each axis in ``around``, and
+    all that are composed of them; index: (N_1, ..., N_d) of the grid."""
+    identity = Image(index.ravel(), np.arange(count), np.ones((count, 3)))
+    group = [identity, *symmetries]
+    for axis in around:
+        exchanged = index.copy()
+        along = np.moveaxis(exchanged, axis, 0)  # a view
+        along[[0, -1]] = along[[-1, 0]]
+        ends = exchanged.ravel()
+        group += [image._replace(index=ends[image.index]) for image in group]
+    return group[1:]
 
 
 def _matched(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NoReturn
 
 import numpy as np
@@ -23,8 +23,9 @@ from geomech.mathematics.geometry.connection import (
 )
 from geomech.mathematics.geometry.curvature import ccf, error
 from geomech.mathematics.geometry.gait import Gait
+from geomech.mathematics.geometry.periods import Periods, checked_periods, period_of
 from geomech.mathematics.geometry.representations.field import UNKNOWN_UNIT, Field
-from geomech.mathematics.geometry.representations.images import mirrored
+from geomech.mathematics.geometry.representations.images import plane_images
 from geomech.mathematics.geometry.representations.tube import Tube
 from geomech.mathematics.geometry.traits import NOTHING, Traits
 from rft.core.checks import is_whole, real_array
@@ -96,6 +97,11 @@ def checked_pair(pair: Sequence[int], joints: int) -> tuple[int, int]:
     return int(pair[0]), int(pair[1])
 
 
+def pair_periods(periods: Periods, pair: tuple[int, int]) -> Periods:
+    """Return the periods of two joints, counted from 1; () where neither has one."""
+    return checked_periods(tuple(period_of(periods, k) for k in indices(pair)), 2)
+
+
 def plane_shapes(axes, pair: tuple[int, int], at: np.ndarray) -> np.ndarray:
     """Return the shapes (N_i, N_j, d) of the plane of two joints, ``axes`` of each,
     through the shape ``at`` (d,)."""
@@ -130,9 +136,8 @@ def plane(
     pair = checked_pair(pair, len(at))
     alpha = plane_shapes(axes, pair, at)
     rates = directions(len(at), count)
-    symmetries = []
-    if traits.halved:
-        symmetries = mirrored(alpha.reshape(-1, len(at)), count)
+    periods = pair_periods(traits.periods, pair)
+    symmetries = plane_images(alpha, count, traits, pair)
     A, residual, speed = sampled_on(
         velocity,
         alpha,
@@ -142,9 +147,17 @@ def plane(
         symmetries,
         traits.singularity,
         map,
+        periods,
     )
     fitted = Connection(
-        axes, A[:, indices(pair)], residual, speed, degree, unit=unit, length=length
+        axes,
+        A[:, indices(pair)],
+        residual,
+        speed,
+        degree,
+        unit=unit,
+        length=length,
+        periods=periods,
     )
     return Plane(pair, tuple(at.tolist()), fitted)
 
@@ -170,9 +183,13 @@ def interpolated_plane(fitted: Connection, pair: tuple[int, int], at) -> Plane:
     residual = np.full((3, *alpha.shape[:-1]), np.nan)
     speed = residual
     if np.isfinite(fitted.residual).all():
-        residual = np.moveaxis(Field(fitted.axes, fitted.residual, 1)(alpha), -1, 0)
-        speed = np.moveaxis(Field(fitted.axes, fitted.speed, 1)(alpha), -1, 0)
-    connection = Connection(axes, A, residual, speed, fitted.degree, **fitted.size)
+        linear = partial(Field, fitted.axes, degree=1, periods=fitted.periods)
+        residual = np.moveaxis(linear(fitted.residual)(alpha), -1, 0)
+        speed = np.moveaxis(linear(fitted.speed)(alpha), -1, 0)
+    periods = pair_periods(fitted.periods, pair)
+    connection = Connection(
+        axes, A, residual, speed, fitted.degree, **fitted.size, periods=periods
+    )
     return Plane(pair, tuple(at.tolist()), connection)
 
 
