@@ -242,6 +242,7 @@ class Swimmer:
             joint_angles=_has_joint_angles(body),
             frame=getattr(body, "frame", MEAN),
             labels=getattr(self.touching_body, "shape_labels", ()),
+            periods=getattr(self.touching_body, "shape_periods", ()),
             frequency=frequencies[0] if frequencies else None,
             compliant=is_compliant,
         )

@@ -106,6 +106,10 @@ class GaitBatch:
     def harmonics(self) -> int:
         return max(gait.harmonics for gait in self.gaits)
 
+    def shape(self, t: np.ndarray, amplitudes=None) -> np.ndarray:
+        """Return alpha (gaits, T..., joints) of the gaits at their own amplitudes."""
+        return np.stack([gait.shape(t) for gait in self.gaits])
+
     def cycle(self, phases: int, amplitudes=None) -> tuple[np.ndarray, np.ndarray]:
         """Return alpha and alphadot (gaits x amplitudes, phases, joints)."""
         computed: dict[int, tuple] = {}  # scenes of a sweep may share their gait
