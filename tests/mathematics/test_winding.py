@@ -233,10 +233,10 @@ def test_a_loop_across_the_seam_encloses_its_area(order):
 
 def test_the_area_of_a_strip_is_that_from_the_loop_at_rest():
     gait = Wound(Fourier(cos=((0.0,),), sin=((1.0,),), centre=(0.3,)))
-    found, error = loop_area(gait, 64, [0.5, 1.0])
+    found, _ = loop_area(gait, 64, [0.5, 1.0])
     np.testing.assert_allclose(found, 0.0, atol=1e-12)
     # alpha swings by a cos t, and tau advances unevenly.
-    found, error = loop_area(Spiral(), 64, [0.2, 0.4])
+    found, _ = loop_area(Spiral(), 64, [0.2, 0.4])
     alpha, alphadot = Spiral().cycle(4096, [0.2, 0.4])
     truth = TURN * (alpha[..., 0] * alphadot[..., 1]).mean(-1)
     np.testing.assert_allclose(found, truth, atol=1e-12)

@@ -279,12 +279,18 @@ def half_grid(
 def _spline_along(x: np.ndarray, rows: np.ndarray, degree: int, repeats: bool):
     """Return the spline through values ``rows`` (N, ...) at x (N,), periodic where it
     ``repeats``."""
-    from scipy.interpolate import make_interp_spline
+    from scipy.interpolate import BSpline, make_interp_spline
 
     # Of degree 0 and 1 a spline through equal ends repeats by itself.
-    if repeats and degree > 1:
-        return make_interp_spline(x, rows, degree, bc_type="periodic")
-    return make_interp_spline(x, rows, degree)
+    if not repeats or degree < 2:
+        return make_interp_spline(x, rows, degree)
+    # SciPy solves for one column after another, of which a field has thousands: here
+    # only for those of single points, of which all others are sums.
+    points = np.eye(len(x))[:, :-1]
+    points[-1] = points[0]
+    basis = make_interp_spline(x, points, degree, bc_type="periodic")
+    coefficients = np.tensordot(basis.c, rows[:-1], 1)
+    return BSpline(basis.t, coefficients, degree)
 
 
 def _slopes_between(x, row, good, degree: int) -> np.ndarray:
