@@ -219,6 +219,14 @@ class WrappedBody:
         return joint_angles(self.inner, shape)
 
 
+def innermost(body: Any) -> Any:
+    """Return the body inside those that wrap it, before its elements were cut into
+    pieces."""
+    while hasattr(body, "inner"):
+        body = body.inner
+    return body
+
+
 def joint_angles(body: Body, shape: np.ndarray) -> np.ndarray:
     """Return the joint angles of a shape whose variables are modes; else the shape
     variables themselves."""

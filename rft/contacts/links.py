@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from rft.bodies.base import innermost
 from rft.contacts.base import CONTACTS, ContactRule, Rise
 from rft.core.checks import real_array
 from rft.core.refusal import Refusal, require
@@ -88,7 +89,7 @@ class LinkContact(ContactRule):
 
     def check(self, body: Any) -> None:
         super().check(body)
-        links = len(getattr(body, "lengths", ()))
+        links = len(getattr(innermost(body), "lengths", ()))
         require(
             links == len(self.links),
             f"links has {len(self.links)} entries, and the body has {links} links",
@@ -98,7 +99,7 @@ class LinkContact(ContactRule):
 
     def placed(self, station: np.ndarray, body: Any) -> np.ndarray:
         """Return places along a body as if its links were of equal length."""
-        ends = np.concatenate([[0.0], np.cumsum(body.fractions)])
+        ends = np.concatenate([[0.0], np.cumsum(innermost(body).fractions)])
         return np.interp(station, ends, np.linspace(0.0, 1.0, len(ends)))
 
     def weights(self, station: np.ndarray, phase: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from rft.bodies.base import Body, half_lengths
+from rft.bodies.base import Body, half_lengths, innermost
 from rft.core.checks import Number, check_numbers, in_range, is_number
 from rft.core.premise import Premise
 from rft.core.refusal import Refusal, require
@@ -221,7 +221,7 @@ class Springs(Effect):
         rows = joint_rows(body)
         count = len(rows)
         require(
-            self.bending is not None or not hasattr(_inner(body), "elements"),
+            self.bending is not None or not hasattr(innermost(body), "elements"),
             "stiffness is of single joints",
             because="a backbone has as many joints as its number of elements asks for",
             instead="give bending, the stiffness of the body as a rod",
@@ -234,7 +234,7 @@ class Springs(Effect):
         if self.bending is None:
             stiffness = _by_joint("stiffness", self.stiffness, count)
         else:
-            half = half_lengths(_inner(body))
+            half = half_lengths(innermost(body))
             distance = (half[:-1] + half[1:])[:, None]
             stiffness = np.asarray(self.bending, float) / distance
         stiffness = stiffness * per_unit / omega**exponent
@@ -299,7 +299,7 @@ class Springs(Effect):
 def joint_rows(body: Body) -> np.ndarray:
     """Return the angles of the joints (E, d) per unit of each of a body's shape
     variables; Refusal for a body whose joints are not known."""
-    body = _inner(body)
+    body = innermost(body)
     if getattr(body, "modes", None) is not None:
         return body.mode_rows.T
     bends = getattr(body, "bends", None)
@@ -313,13 +313,6 @@ def joint_rows(body: Body) -> np.ndarray:
         instead="use a chain or a backbone",
     )
     return np.eye(body.joints)
-
-
-def _inner(body: Body) -> Body:
-    """Return a body before its elements were cut into pieces."""
-    while hasattr(body, "inner"):
-        body = body.inner
-    return body
 
 
 def _checked_joints(name: str, joints: Any) -> tuple[int, ...]:
