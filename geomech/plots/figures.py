@@ -25,6 +25,7 @@ from geomech.plots.maps import (
     draw_gait,
     has_component,
     has_row,
+    inside_periods,
     largest,
     note_zero_components,
     panel_components,
@@ -400,9 +401,10 @@ def _draw_shadow(gait: ProjectedGait, ax: Any, field: Field, is_surface: bool) -
     """Draw a gait that leaves the plane, as seen along the fixed joints."""
     if is_surface:
         floor = ax.get_zlim()[0]
-        ax.plot(*gait.shape(PHASES).T, floor, "--", color="black", lw=1.0)
+        curve = inside_periods(gait.shape(PHASES), field.axes, field.periods)
+        ax.plot(*curve.T, floor, "--", color="black", lw=1.0)
     else:
-        draw_gait(gait, ax, within=field.axes, line="--")
+        draw_gait(gait, ax, within=field.axes, line="--", periods=field.periods)
 
 
 def _merge_legends(fig: Figure, axes: Any) -> None:

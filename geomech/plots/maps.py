@@ -13,6 +13,7 @@ from geomech.core.errors import choose
 from geomech.mathematics.gaits import Gait
 from geomech.mathematics.geometry.connection import Connection
 from geomech.mathematics.geometry.metric import Finsler, Metric
+from geomech.mathematics.geometry.periods import Periods, periodic_axes
 from geomech.mathematics.geometry.representations.field import Field
 from geomech.plots.look import colours, font_points
 from geomech.plots.style import axes_of, figure, quantity, styled
@@ -271,10 +272,13 @@ def ccf_map(
     for gait in gaits:
         line = getattr(gait, "line", "-")
         colour = getattr(gait, "colour", "black")
-        draw_gait(gait, ax, colour, within=field.axes, line=line)
+        draw_gait(gait, ax, colour, field.axes, line, field.periods)
     _label_loops(ax, gaits)
-    if not all(is_inside(gait.shape(PHASES), field.axes).all() for gait in gaits):
-        _note_gait_outside(ax)
+    for gait in gaits:
+        curve = inside_periods(gait.shape(PHASES), field.axes, field.periods)
+        if not is_inside(curve[np.isfinite(curve).all(-1)], field.axes).all():
+            _note_gait_outside(ax)
+            break
 
     ax.set_title(f"{ccf_name(component)}: {TITLES[component]}")
     extend = colorbar_extend(image.get_array(), top)
@@ -589,10 +593,13 @@ def draw_gait(
     color: str = "black",
     within: Sequence[np.ndarray] | None = None,
     line: str = "-",
+    periods: Periods = (),
 ) -> Axes:
     """Draw the gait's curve with a dot at its start and an arrow along it.
 
     within: axes of a grid, beyond which the curve is not drawn. line: its style.
+    periods: of the axes; beyond the end of one with a period the curve goes on at the
+    axis's other end.
 
     Examples
     --------
@@ -603,9 +610,11 @@ def draw_gait(
     """
     ax = axes_of(ax)
     curve = gait.shape(PHASES)
+    if within is not None:
+        curve = inside_periods(curve, within, periods)
     curve[~is_inside(curve, within or ())] = np.nan
     ax.plot(*curve.T, line, color=color, lw=1.2)
-    ax.plot(*curve[0], "o", color=color, ms=3)
+    ax.plot(*curve[0], "o", color=color, ms=3, clip_on=not periods)
     start = _arrow_start(curve)
     if start is not None:
         draw_arrow(ax, curve[start], curve[start + 8], color)
@@ -613,14 +622,57 @@ def draw_gait(
 
 
 def _arrow_start(curve: np.ndarray) -> int | None:
-    """Return the index of a curve (400, 2) at which an arrow of 8 steps begins: an
-    eighth of the cycle, or the next one at which both ends are inside and differ."""
-    for k in np.roll(np.arange(392), -50):
-        start = curve[k]
-        end = curve[k + 8]
-        if np.isfinite(start).all() and np.isfinite(end).all() and (start != end).any():
+    """Return the index of a curve (P, 2) at which an arrow of 8 steps begins: an eighth
+    of the cycle, or the next one at which the curve is inside and does not rest."""
+    for k in np.roll(np.arange(len(curve) - 8), -50):
+        steps = curve[k : k + 9]
+        if np.isfinite(steps).all() and (steps[0] != steps[-1]).any():
             return k
     return None
+
+
+def inside_periods(
+    curve: np.ndarray, axes: Sequence[np.ndarray], periods: Periods
+) -> np.ndarray:
+    """Return a curve (P, 2) with the variables that have periods within their axes, as
+    a picture shows it.
+
+    Where it passes the end of an axis it has three more points: at this end, nan, and
+    at the other end."""
+    for k in periodic_axes(periods):
+        first = axes[k][0]
+        turns = np.floor((curve[:, k] - first) / periods[k] + 1e-9)
+        # At the end of the axis itself the curve has not passed it.
+        at_end = curve[-1, k] - first - turns[-1] * periods[k]
+        if len(turns) > 1 and turns[-1] > turns[-2] and at_end < 1e-9 * periods[k]:
+            turns[-1] = turns[-2]
+        pieces = []
+        for n, turn in enumerate(turns):
+            if n and turn != turns[n - 1]:
+                ends = curve[n - 1 : n + 1]
+                around = turns[n - 1 : n + 1]
+                pieces.append(_across_seam(ends, k, around, first, periods[k]))
+            point = curve[n].copy()
+            point[k] -= turn * periods[k]
+            pieces.append(point[None])
+        curve = np.concatenate(pieces)
+    return curve
+
+
+def _across_seam(
+    ends: np.ndarray, k: int, turns: np.ndarray, first: float, period: float
+) -> np.ndarray:
+    """Return the points (3, 2) between two points of a curve (2, 2) on different turns
+    of variable k: at the end of the axis, nan, and at its other end."""
+    before, after = turns
+    seam = first + max(before, after) * period
+    share = (seam - ends[0, k]) / (ends[1, k] - ends[0, k])
+    point = ends[0] + share * (ends[1] - ends[0])
+    leaving = point.copy()
+    entering = point.copy()
+    leaving[k] = seam - before * period
+    entering[k] = seam - after * period
+    return np.stack([leaving, np.full(2, np.nan), entering])
 
 
 def draw_arrow(ax: Axes, start: Any, end: Any, color: str = "black") -> None:

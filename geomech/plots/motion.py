@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from geomech.core.variables import Result
+from geomech.mathematics.geometry.periods import period_of, wrapped
 from geomech.mathematics.geometry.representations.field import Field
 from geomech.mathematics.systems.base import body_size, shape_labels
 from geomech.plots.look import font_points
@@ -208,6 +209,8 @@ def draw_shapes(
 
         def move_dot(row: int) -> tuple:
             alpha = motion.alpha[row]
+            if field is not None:
+                alpha = wrapped(alpha, field.axes, field.periods)
             dot.set_data([alpha[0]], [alpha[1]])
             return (dot,)
 
@@ -252,8 +255,13 @@ def _draw_cycle(ax: Axes, motion: ShownMotion, turns: np.ndarray) -> None:
     if motion.scene.system.joints > LINES:
         _draw_bends(ax, motion, turns[first])
         return
+    periods = motion.scene.system.traits.periods
     for k, (name, _) in enumerate(labels):
-        ax.plot(turns[first], motion.alpha[first, k], label=quantity(name))
+        values = motion.alpha[first, k]
+        period = period_of(periods, k)
+        if period is not None:  # the end of a cycle is stored as its start
+            values = np.unwrap(values, period=period)
+        ax.plot(turns[first], values, label=quantity(name))
     ax.set_ylabel(quantity("shape variable", labels[0][1]))
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=4)
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from geomech.mathematics.gaits import Gait
 from geomech.mathematics.geometry.connection import Connection
+from geomech.mathematics.geometry.periods import Periods, ends_differ, period_of
 from geomech.mathematics.geometry.representations.field import Field
 from geomech.plots.look import colours, font_points
 from geomech.plots.maps import (
@@ -24,6 +25,7 @@ from geomech.plots.maps import (
     ccf_name,
     draw_gait,
     drawable,
+    inside_periods,
     label_row,
     refined,
     scale_limit,
@@ -154,7 +156,7 @@ def ccf_contours(
     signs = set()
     for gait in gaits:
         signs |= _shade_area(ax, field, component, gait, error)
-        draw_gait(gait, ax, within=field.axes)
+        draw_gait(gait, ax, within=field.axes, periods=field.periods)
     if signs:
         _sign_legend(ax, component, signs, -0.2)
     ax.set_title(f"{ccf_label(component, field.unit, labels)}: {TITLES[component]}")
@@ -216,7 +218,7 @@ def _shade_area(
         return set()
     x, y = (np.linspace(a[0], a[-1], AREA_POINTS) for a in field.axes)
     shapes = np.stack(np.meshgrid(x, y, indexing="ij"), -1)
-    times = winding(gait.shape(PHASES), x, y)
+    times = times_enclosed(gait, x, y, field.periods)
     density = Field(field.axes, field.values[component], 1)(shapes) * times
     if error is not None:
         errors = Field(error.axes, error.values[component], 1)(shapes)
@@ -229,6 +231,39 @@ def _shade_area(
             look = {"levels": [0.5, 2.0], "colors": [colour], "alpha": 0.35}
             ax.contourf(x, y, mask.T, zorder=0, **look)
     return signs
+
+
+def times_enclosed(
+    gait: Gait, x: np.ndarray, y: np.ndarray, periods: Periods
+) -> np.ndarray:
+    """Return how often a gait goes around the points of the grid x (N,) by y (M,),
+    positive counter-clockwise; (N, M).
+
+    On axes with periods it goes around a point if it goes around it whole periods away,
+    and a gait that winds is closed by its loop at rest, run backwards."""
+    curve = gait.shape(PHASES)
+    if not periods:
+        return winding(curve, x, y)
+    if ends_differ(gait):
+        try:
+            rest = gait.shape(PHASES, 0.0)
+        except TypeError:  # a curve without a family
+            return np.zeros((len(x), len(y)), int)
+        curve = np.concatenate([curve, rest[::-1]])
+    shifts = []
+    for k, grid in enumerate((x, y)):
+        period = period_of(periods, k)
+        if period is None:
+            shifts.append([0.0])
+            continue
+        low = np.floor((curve[:, k].min() - grid[0]) / period)
+        high = np.floor((curve[:, k].max() - grid[0]) / period)
+        shifts.append(period * np.arange(low, high + 1))
+    times = np.zeros((len(x), len(y)), int)
+    for x_shift in shifts[0]:
+        for y_shift in shifts[1]:
+            times += winding(curve, x + x_shift, y + y_shift)
+    return times
 
 
 def winding(curve: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -296,7 +331,8 @@ def ccf_surface(
     floor = -1.6 * top
     signs = set()
     for gait in gaits:
-        ax.plot(*gait.shape(PHASES).T, floor, color="black", lw=1.0)
+        curve = inside_periods(gait.shape(PHASES), field.axes, field.periods)
+        ax.plot(*curve.T, floor, color="black", lw=1.0)
         if not field.masked:
             _draw_on_surface(ax, field, component, gait, top)
             signs |= _shade_floor(ax, field, component, gait, floor)
@@ -321,7 +357,7 @@ def _draw_on_surface(
     ax: Axes, field: Field, component: int, gait: Gait, top: float
 ) -> None:
     """Draw a gait at the height of the surface, as far as the field goes."""
-    curve = gait.shape(PHASES)
+    curve = inside_periods(gait.shape(PHASES), field.axes, field.periods)
     low = [axis[0] for axis in field.axes]
     high = [axis[-1] for axis in field.axes]
     inside = ((curve >= low) & (curve <= high)).all(-1)
@@ -339,7 +375,7 @@ def _shade_floor(
     occur."""
     x, y = (np.linspace(a[0], a[-1], AREA_POINTS // 2) for a in field.axes)
     shapes = np.stack(np.meshgrid(x, y, indexing="ij"), -1)
-    times = winding(gait.shape(PHASES), x, y)
+    times = times_enclosed(gait, x, y, field.periods)
     density = Field(field.axes, field.values[component], 1)(shapes) * times
     signs = set()
     for sign, colour in ((1, PLUS), (-1, MINUS)):

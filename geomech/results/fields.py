@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from geomech.core.variables import Result, Variable
+from geomech.io.tables.base import PERIOD
 from geomech.mathematics.geometry.connection import Connection
 from geomech.mathematics.geometry.metric import Finsler, Metric
+from geomech.mathematics.geometry.periods import Periods, checked_periods
 from geomech.mathematics.geometry.representations.field import Field
 from geomech.mathematics.geometry.stretch import Stretch
 
@@ -85,6 +87,15 @@ def axes_of(result: Result, dims: Sequence[str]) -> tuple[np.ndarray, ...]:
     return tuple(result[dim].values for dim in dims)
 
 
+def periods_of(result: Result, dims: Sequence[str]) -> Periods:
+    """Return the periods of axes, () where none has one."""
+    periods = []
+    for dim in dims:
+        name = f"{PERIOD}{dim}"
+        periods.append(float(result[name]) if name in result else None)
+    return checked_periods(tuple(periods), len(periods))
+
+
 def degree_of(result: Result) -> int:
     """Return the degree of the splines through the fields of a result."""
     return int(result.attributes["interpolation"])
@@ -95,11 +106,14 @@ def field_of(result: Result, name: str) -> tuple[Field, Field | None]:
     variable = result[name]
     axes = axes_of(result, variable.dims[1:])
     degree = degree_of(result)
-    unit = length_unit(variable)
+    more = {
+        "unit": length_unit(variable),
+        "periods": periods_of(result, variable.dims[1:]),
+    }
     error = None
     if variable.error is not None:
-        error = Field(axes, variable.error, degree, unit=unit)
-    return Field(axes, variable.values, degree, unit=unit), error
+        error = Field(axes, variable.error, degree, **more)
+    return Field(axes, variable.values, degree, **more), error
 
 
 def connection_of(result: Result, name: str = "A") -> Connection:
@@ -110,7 +124,10 @@ def connection_of(result: Result, name: str = "A") -> Connection:
     unknown = np.full_like(variable.values[:, 0], np.nan)
     degree = degree_of(result)
     unit = length_unit(variable)
-    return Connection(axes, variable.values, unknown, unknown, degree, unit=unit)
+    periods = periods_of(result, variable.dims[2:])
+    return Connection(
+        axes, variable.values, unknown, unknown, degree, unit=unit, periods=periods
+    )
 
 
 def metric_of(result: Result) -> Metric | Finsler:
@@ -118,11 +135,14 @@ def metric_of(result: Result) -> Metric | Finsler:
     degree = degree_of(result)
     if "metric" in result:
         metric = result["metric"]
-        return Metric(axes_of(result, metric.dims[2:]), metric.values, degree)
+        axes = axes_of(result, metric.dims[2:])
+        periods = periods_of(result, metric.dims[2:])
+        return Metric(axes, metric.values, degree, periods=periods)
     norm = result["norm"]
     axes = axes_of(result, norm.dims[1:])
     residual = result["norm_residual"].values
-    return Finsler(axes, norm.values, residual, degree)
+    periods = periods_of(result, norm.dims[1:])
+    return Finsler(axes, norm.values, residual, degree, periods=periods)
 
 
 def slices_of(result: Result, name: str) -> list[Slice]:

@@ -113,7 +113,8 @@ class Scene(SceneRepr):
             gait = wound_for(gait, self.system.joints, periods)
             object.__setattr__(self, "gait", gait)
             _check_joints(self.system, gait)
-            winding(gait, periods)  # refuses a gait that does not close
+            if hasattr(gait, "shape"):
+                winding(gait, periods)  # refuses a gait that does not close
             frequency_of(self.system, self.gait)
             object.__setattr__(self, "system", reframed(self.system, self.numerics))
             self.note_turns(self.gait)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from scipy.fft import irfft, rfft
 
 from geomech.mathematics.gaits import Gait
+from geomech.mathematics.geometry.periods import winding
 from geomech.mathematics.systems.base import Cycle, System
 from geomech.mathematics.systems.capabilities import Compliant, capability
 from rft.motion.compliance import SpringMotion
@@ -79,7 +80,16 @@ class RealisedGait:
         motion = self.motion(amplitudes)
         if phases == self.phases:
             return motion.alpha, motion.alphadot
-        return _resampled(motion.alpha, phases), _resampled(motion.alphadot, phases)
+        alphadot = _resampled(motion.alphadot, phases)
+        turns = np.array(winding(self.command, self.system.traits.periods))
+        if not turns.size:
+            return _resampled(motion.alpha, phases), alphadot
+        # Only what returns is a Fourier series.
+        lengths = [period or 0.0 for period in self.system.traits.periods]
+        advance = turns * np.array(lengths)
+        share = np.arange(self.phases)[:, None] / self.phases
+        returning = _resampled(motion.alpha - share * advance, phases)
+        return returning + np.arange(phases)[:, None] / phases * advance, alphadot
 
 
 class LimitCycles(NamedTuple):

@@ -13,6 +13,7 @@ import numpy as np
 from geomech.core.variables import Result, Variable
 from geomech.mathematics.gaits import Butterfly, Circle, Gait
 from geomech.mathematics.gaits.wound import unwound
+from geomech.mathematics.geometry.periods import period_of
 from geomech.mathematics.systems.base import System, refuse_singular
 from geomech.mathematics.systems.capabilities import near_gait
 from geomech.mathematics.systems.swimmer import is_three_link
@@ -239,7 +240,7 @@ def reachable_amplitudes(scene: Scene, gait: Gait) -> list[float]:
         or system.traits.singularity is not None
         or is_too_large(system, scene.numerics)
     )
-    unit = gait.unit(np.linspace(0, 2 * np.pi, 721))
+    unit = unwound(gait).unit(np.linspace(0, 2 * np.pi, 721))
     is_still = np.ptp(unit, axis=0).max() == 0
     if is_still or (up_to_own and gait.amplitude == 0):
         raise Refusal(
@@ -252,7 +253,12 @@ def reachable_amplitudes(scene: Scene, gait: Gait) -> list[float]:
         size = abs(gait.amplitude)
         sizes = [a for a in round_amplitudes(size) if a < size * (1 - 1e-9)] + [size]
     else:
-        sizes = round_amplitudes(_range_of_field(scene, gait) / np.abs(unit).max())
+        repeats = [p is not None for p in system.traits.periods]
+        limited = np.delete(unit, np.flatnonzero(repeats[: unit.shape[1]]), axis=1)
+        largest = np.abs(limited).max(initial=0.0)
+        if not largest:  # it moves only variables that no field limits
+            return [float(gait.amplitude)]
+        sizes = round_amplitudes(_range_of_field(scene, gait) / largest)
     return [float(np.copysign(a, gait.amplitude)) for a in sizes]
 
 
@@ -260,8 +266,10 @@ def _range_of_field(scene: Scene, gait: Gait) -> float:
     """Return the least distance, rad, from the gait's middle to the edge of the field;
     Refusal if it lies outside."""
     ranges = []
-    for axis, x in zip(field_axes(scene.system, scene.numerics), gait.middle):
-        ranges.append(min(axis[-1] - x, x - axis[0]))
+    axes = field_axes(scene.system, scene.numerics)
+    for k, (axis, x) in enumerate(zip(axes, gait.middle)):
+        if period_of(scene.system.traits.periods, k) is None:
+            ranges.append(min(axis[-1] - x, x - axis[0]))
     if min(ranges) <= 0:
         raise Refusal(
             "the gait's centre lies outside the field",

@@ -162,6 +162,11 @@ def test_what_a_system_says_of_itself_holds(name):
     columns = np.stack([system.velocity(alpha, e) for e in np.eye(system.joints)], -1)
     residual = np.abs(np.einsum("bij,bj->bi", columns, alphadot) - xi).max()
     assert (residual < 1e-9 * np.abs(columns).max()) == system.traits.linear
+    for k, period in enumerate(system.traits.periods):
+        if period is not None:
+            later = alpha + period * np.eye(system.joints)[k]
+            repeated = system.velocity(later, alphadot)
+            np.testing.assert_allclose(repeated, xi, rtol=1e-9, atol=1e-9)
     assert length_unit(system) == "m"
     assert KINDS[kind_of(system)] is type(system)
 

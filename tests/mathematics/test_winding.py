@@ -13,7 +13,7 @@ import geomech
 from geomech.mathematics.gaits import Circle, Fourier, Gait, Wave, Wound
 from geomech.mathematics.geometry import connection, curvature, family
 from geomech.mathematics.geometry.gait import loop_area
-from geomech.mathematics.geometry.loop_at_rest import wound_area
+from geomech.mathematics.geometry.loop_at_rest import wound_area, wound_area_by
 from geomech.mathematics.geometry.two_form import spanned, spanned_by, two_form
 from geomech.mathematics.tiers.area import area
 from geomech.mathematics.tiers.direct import direct
@@ -255,11 +255,29 @@ def test_an_area_without_the_loop_at_rest_is_refused(ask):
         ask(fitted_connection(Lifted(), 15), Wound(SINE))
 
 
-def test_an_area_without_a_field_is_refused():
-    found = study(Lifted(links=3), Wave(joints=3), grid=31)
-    with pytest.raises(Refusal, match="too large"):
-        found.poses("area")
-    assert np.isfinite(found.poses("path")).all()
+def test_the_area_is_the_same_without_a_field():
+    system = Lifted(0.7, links=2)
+    gait = Wound(Circle(0.3))
+    A = fitted_connection(system, 25, 0.6)
+    with_field = wound_area(A, gait, tips=2)
+
+    def alone(alpha):
+        columns = [system.velocity(alpha, unit) for unit in np.eye(3)]
+        return np.stack(columns, -1)
+
+    without = wound_area_by(alone, gait, system.traits.periods, tips=2)
+    np.testing.assert_allclose(without.net, with_field.net, atol=1e-4)
+    np.testing.assert_allclose(without.spread, with_field.spread, atol=1e-4)
+
+
+def test_a_plain_study_of_many_joints_has_the_area_of_a_wound_gait():
+    system = Lifted(0.5, links=3)
+    result = geomech.study(system, Wave(0.2, joints=3), phases=64).displacement([0.2])
+    truth = direct(system.velocity, Wound(Wave(0.2, joints=3)), [0.2])
+    assert "area" in result["tier"].values
+    for k, name in enumerate(("x", "y", "heading")):
+        true = np.abs(result[name].values - truth[:, k])
+        assert (true <= result[name].error + 1e-12).all()
 
 
 def test_a_family_of_wound_gaits_moves_at_amplitude_zero():

@@ -33,11 +33,13 @@ ORDERS = ("ndgrid", "meshgrid")
 #             result of `geomech.studies.maps.fields`
 #   settings  the names of its settings, of "sign", "order" and "layout"
 #   joints    the only number of joints that it takes, if there is one
+#   periods   whether it stores periods of shape variables; False if left out
 #   whole     False where it takes A, its error and a quadratic metric alone
 FORMATS = Registry(
     "geomech.formats", "suffix", "a file format", functions_with("suffix")
 )
 ROWS = ("x", "y", "theta")
+PERIOD = "period_"  # before the name of an axis: a variable with its period
 ROUNDING = 1e-9  # of the largest velocity: a displacement below it has no sign
 MIRROR_SIGNS = np.array([-1.0, 1.0, 1.0])  # signs of the rows of A in a mirror
 
@@ -129,6 +131,7 @@ def scaled(stored: Stored, factor: float) -> Stored:
 
     c = stored.connection
     size: dict[str, Any] = {"unit": stored.unit, "length": stored.length}
+    size["periods"] = c.periods
     if isinstance(c, Tube):
         series = c.taylor
         size["taylor"] = replace(
@@ -144,11 +147,10 @@ def scaled(stored: Stored, factor: float) -> Stored:
     )
     harmonics = stored.harmonics
     if harmonics:
-        harmonics = Harmonics(
-            harmonics.axes,
-            times(harmonics.coefficients),
-            times(harmonics.residual),
-            harmonics.degree,
+        harmonics = replace(
+            harmonics,
+            coefficients=times(harmonics.coefficients),
+            residual=times(harmonics.residual),
         )
     even = stored.even
     if even is not None:

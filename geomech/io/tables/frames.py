@@ -42,7 +42,9 @@ def in_frame(stored: Stored, frame: str, chain: Any = None) -> Stored:
     A = np.moveaxis(matrices, (-2, -1), (0, 1))
     residual = bound(c.residual)
     speed = rms(A, np.nan_to_num(residual))
-    connection = Connection(c.axes, A, residual, speed, c.degree, **c.size)
+    connection = Connection(
+        c.axes, A, residual, speed, c.degree, **c.size, periods=c.periods
+    )
 
     harmonics = stored.harmonics
     if harmonics:
@@ -116,4 +118,4 @@ def _harmonics(
     linear = np.linalg.pinv(basis(unit, table.highest)) @ unit
     coefficients = _times(adjoint, table.coefficients)
     coefficients = coefficients + np.einsum("ik...,tk->it...", added, linear)
-    return Harmonics(table.axes, coefficients, residual, table.degree)
+    return replace(table, coefficients=coefficients, residual=residual)

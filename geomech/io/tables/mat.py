@@ -29,6 +29,7 @@ from geomech.io.tables.base import (
     LARGEST_ANGLE,
     LAYOUTS,
     ORDERS,
+    PERIOD,
     SIGNS,
     UNKNOWN_FRAME,
     Stored,
@@ -76,6 +77,11 @@ def write(
     body length, unit and spline. order: rows run over alpha1 ("ndgrid") or over alpha2
     ("meshgrid"). layout: "struct" writes sysplotter's struct s (`write_struct`)
     instead."""
+    if any(name.startswith(PERIOD) for name in result):
+        raise Refusal(
+            "a .mat file stores no periods of shape variables",
+            instead="write a .nc file",
+        )
     if layout == LAYOUTS[1]:
         write_struct(path, result)
         return

@@ -16,6 +16,7 @@ from geomech.core.variables import Variable
 from geomech.io.results import write_netcdf
 from geomech.io.tables.base import (
     FORMATS,
+    PERIOD,
     ROWS,
     SIGNS,
     UNKNOWN_FRAME,
@@ -32,6 +33,11 @@ from geomech.io.tables.base import (
 )
 from geomech.mathematics.geometry.connection import Connection
 from geomech.mathematics.geometry.metric import Finsler, Metric
+from geomech.mathematics.geometry.periods import (
+    Periods,
+    check_axes,
+    checked_periods,
+)
 from geomech.mathematics.geometry.representations.harmonics import Harmonics
 from geomech.mathematics.geometry.representations.tube import Loop, TaylorSeries, Tube
 from rft.core.refusal import Refusal
@@ -51,7 +57,7 @@ TAYLOR_VARIABLES = {  # of the series about a gait, with their numbers of dimens
 }
 
 
-@FORMATS.register(suffix=".nc", write=write_netcdf)
+@FORMATS.register(suffix=".nc", write=write_netcdf, periods=True)
 def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
     """Return the table in the bytes of a file. Refusal, whose words follow the file's
     name, if there is none."""
@@ -118,6 +124,27 @@ class _Contents:
         return tuple(
             checked_axis(name, self.variables[name][1]) for name in self.axis_names
         )
+
+    @cached_property
+    def periods(self) -> Periods:
+        """The periods of the axes; Refusal for one that cannot be, or that its axis
+        does not cover."""
+        periods = []
+        for name in self.axis_names:
+            _, period = self.variables.get(f"{PERIOD}{name}", ((), None))
+            if period is not None and np.shape(period) != ():
+                raise Refusal(f"has a {PERIOD}{name} that is no number", instead=SOURCE)
+            periods.append(None if period is None else float(period))
+        try:
+            checked = checked_periods(tuple(periods), self.joints)
+            check_axes(self.axes, checked)
+        except Refusal as refusal:
+            raise Refusal(
+                "has a period that does not fit its axis",
+                because=str(refusal),
+                instead=SOURCE,
+            ) from None
+        return checked
 
     def values(self, name: str) -> np.ndarray:
         """Return a variable as finite numbers."""
@@ -232,7 +259,10 @@ def _stored(contents: _Contents, sign: str, sha256: str) -> Stored:
             axes, factor * A, residual, speed, degree, series, **size
         )
     else:
-        connection = Connection(axes, factor * A, residual, speed, degree, **size)
+        connection = Connection(
+            axes, factor * A, residual, speed, degree, **size, periods=contents.periods
+        )
+        _ = connection.field  # refuses ends that differ where there is a period
 
     even = None
     if "even_part" in contents and not masked.any():
@@ -363,6 +393,7 @@ def _harmonics(
         factor * checked_numbers("harmonics", rows),
         checked_numbers("harmonics_residual", residual),
         degree,
+        periods=contents.periods,
     )
 
 
@@ -453,7 +484,7 @@ def _quadratic_metric(contents: _Contents, degree: int) -> Metric:
             f"has a metric of shape {M.shape}; it must be ({joints}, {joints}, ...) "
             "and symmetric"
         )
-    return Metric(contents.axes, M, degree)
+    return Metric(contents.axes, M, degree, periods=contents.periods)
 
 
 def _norm(contents: _Contents, degree: int) -> Finsler:
@@ -467,7 +498,7 @@ def _norm(contents: _Contents, degree: int) -> Finsler:
     residual = 0 * rows[0]
     if "norm_residual" in contents:
         residual = checked_numbers("norm_residual", contents.field("norm_residual"))
-    return Finsler(contents.axes, rows, residual, degree)
+    return Finsler(contents.axes, rows, residual, degree, periods=contents.periods)
 
 
 def _check_pairs(contents: _Contents, masked: np.ndarray) -> None:

@@ -16,6 +16,7 @@ enclosed by a small loop, and 2 if g were left out."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -23,12 +24,11 @@ from numpy.typing import ArrayLike
 
 from geomech.mathematics.geometry.connection import SAMPLES_TOGETHER, Connection
 from geomech.mathematics.geometry.gait import Gait, checked_gait
-from geomech.mathematics.geometry.periods import winding
+from geomech.mathematics.geometry.periods import Periods, winding
 from geomech.mathematics.geometry.reconstruct import displacement
 from geomech.mathematics.geometry.two_form import (
     RADII,
     Spanned,
-    TwoForm,
     gait_amplitudes,
     two_form,
     with_spread,
@@ -38,6 +38,7 @@ from rft.core.refusal import Refusal
 from rft.formulas import se2
 
 NODES = 16  # of Gauss's rule along a line, where a field of two variables is cheap
+STEP = 2e-4  # rad, of differences where there is no field
 STEPS = 4  # of the midpoint rule, from the loop at rest to the gait's first shape
 
 
@@ -95,13 +96,63 @@ def wound_area(
         )
     amplitudes = gait_amplitudes(gait, amplitudes)
     _check_loop_at_rest(gait, connection.periods, amplitudes)
+    return _in_batches(connection.field, form, gait, amplitudes, phases, tips)
+
+
+def wound_area_by(
+    A: Callable,
+    gait: Gait,
+    periods: Periods,
+    amplitudes: ArrayLike | None = None,
+    phases: int = 64,
+    tips: int = 0,
+) -> Spanned:
+    """Return `wound_area` without a field: A(alpha) -> (..., 3, d) is evaluated at
+    shapes (..., d) of the strips, and its derivatives are differences over `STEP`."""
+    in_range("phases", phases, 8, 1e6, whole=True)
+    in_range("tips", tips, 0, phases, whole=True)
+    amplitudes = gait_amplitudes(checked_gait(gait), amplitudes)
+    _check_loop_at_rest(gait, periods, amplitudes)
+    form = _Differences(A, gait.joints)
+    return _in_batches(A, form, gait, amplitudes, phases, tips)
+
+
+class _Differences(NamedTuple):
+    """The CCF of a connection A(alpha) without a field, as `TwoForm`."""
+
+    A: Callable
+    joints: int
+
+    def __call__(self, alpha, u, v) -> np.ndarray:
+        """Return CCF(u, v) (..., 3) = D_u(A) v - D_v(A) u + [A u, A v]."""
+        alpha, u, v = np.broadcast_arrays(alpha, u, v)
+        A = self.A(alpha)
+        exterior = _times(self._derivative(alpha, u), v)
+        exterior = exterior - _times(self._derivative(alpha, v), u)
+        return exterior + se2.bracket(_times(A, u), _times(A, v))
+
+    def _derivative(self, alpha, u) -> np.ndarray:
+        """Return D_u(A) (..., 3, d)."""
+        size = np.linalg.norm(u, axis=-1, keepdims=True)
+        step = STEP * u / np.where(size > 0, size, 1.0)
+        change = self.A(alpha + step) - self.A(alpha - step)
+        return change * (size / (2 * STEP))[..., None]
+
+
+def _times(A: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Return A u (..., 3) of matrices (..., 3, d) and changes of shape (..., d)."""
+    return np.einsum("...ij,...j->...i", A, u)
+
+
+def _in_batches(A: Callable, form, gait, amplitudes, phases, tips) -> Spanned:
+    """Return displacements of many amplitudes, so that memory is bounded."""
     if form.joints == 2:
         tips = 0
     batch = max(1, SAMPLES_TOGETHER // int(phases))
     results = []
     for k in range(0, max(1, len(amplitudes)), batch):
         group = amplitudes[k : k + batch]
-        results.append(_strips(connection, form, gait, group, int(phases), int(tips)))
+        results.append(_strips(A, form, gait, group, int(phases), int(tips)))
     net, others = zip(*results)
     return with_spread(np.concatenate(net), np.concatenate(others))
 
@@ -119,13 +170,16 @@ def _check_loop_at_rest(gait: Gait, periods, amplitudes: np.ndarray) -> None:
 
 
 def _strips(
-    connection: Connection, form: TwoForm, gait: Gait, amplitudes, phases, tips
+    A_at: Callable, form, gait: Gait, amplitudes, phases, tips
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return displacements by the strip from the loop at rest (B, 3), and by those
-    through parallel loops (B, tips, 3)."""
+    through parallel loops (B, tips, 3).
+
+    A_at: the connection, a function of shapes. form: its CCF, a `TwoForm` or a function
+    like it."""
     alpha, alphadot = gait.cycle(phases, amplitudes)  # (B, N, d)
     rest, rest_rate = gait.cycle(phases, 0.0)  # (N, d)
-    A = connection.field(rest)
+    A = A_at(rest)
     delta = alpha - rest
     delta_rate = alphadot - rest_rate
     none = np.zeros(alpha.shape[-1])
@@ -146,14 +200,14 @@ def _strips(
         first = np.zeros((len(delta), 3))
         for leg in legs:
             xi = xi + _across(form, A, rest, rest_rate, leg)
-            first = se2.compose(first, _transport(connection, rest[0], leg))
+            first = se2.compose(first, _transport(A_at, rest[0], leg))
         at_rest = displacement(xi)
         poses.append(se2.compose(se2.inverse(first), se2.compose(at_rest, first)))
     poses = np.stack(poses, 1)
     return poses[:, 0], poses[:, 1:]
 
 
-def _across(form: TwoForm, A, rest, rest_rate, leg: _Leg) -> np.ndarray:
+def _across(form, A, rest, rest_rate, leg: _Leg) -> np.ndarray:
     """Return the integral (B, N, 3) of the CCF along one leg of the lines, seen from
     the loop at rest, where the connection is A (N, 3, d)."""
     n_nodes = NODES if form.joints == 2 else RADII
@@ -170,14 +224,14 @@ def _across(form: TwoForm, A, rest, rest_rate, leg: _Leg) -> np.ndarray:
     return total
 
 
-def _transport(connection: Connection, rest: np.ndarray, leg: _Leg) -> np.ndarray:
+def _transport(A_at: Callable, rest: np.ndarray, leg: _Leg) -> np.ndarray:
     """Return the poses (B, 3) at the end of a leg, at phase 0, relative to those at its
     start; rest: (d,), on the loop at rest."""
     start, end = (x if x.ndim == 1 else x[:, 0] for x in (leg.start, leg.end))
     change = end - start
     pose = np.zeros((len(change), 3))
     for k in range(STEPS):
-        A = connection.field(rest + start + (k + 0.5) / STEPS * change)
+        A = A_at(rest + start + (k + 0.5) / STEPS * change)
         step = np.einsum("bij,bj->bi", A, change / STEPS)
         pose = se2.compose(pose, se2.exp(step))
     return pose

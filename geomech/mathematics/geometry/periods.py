@@ -19,6 +19,7 @@ Periods = tuple[float | None, ...]
 LONGEST = 1e6  # rad: of a longer period few digits of a shape are left
 SAME = 1e-6  # of the largest value: the largest difference of the two ends of an axis
 CLOSED = 1e-9  # rad: the largest distance of the ends of a closed curve
+SHORTEST = 1e-2  # rad: ends that are further apart are those of a gait that winds
 
 
 def checked_periods(periods: object, joints: int) -> Periods:
@@ -36,9 +37,10 @@ def checked_periods(periods: object, joints: int) -> Periods:
         if period is None:
             continue
         is_number = isinstance(period, (int, float, np.number))
-        if not is_number or isinstance(period, bool) or not 0 < period <= LONGEST:
+        is_number = is_number and not isinstance(period, bool)
+        if not (is_number and SHORTEST < period <= LONGEST):
             raise Refusal(
-                f"a period must be above 0 and at most {LONGEST:g}, or None",
+                f"a period must be above {SHORTEST:g} and at most {LONGEST:g}, or None",
                 value=period,
             )
     return tuple(None if period is None else float(period) for period in periods)
@@ -116,19 +118,18 @@ def winding(
     Refusal for a gait that is not closed, or does not wind alike at all amplitudes."""
     if not periods:
         return ()
-    ends = gait.shape(np.array([0.0, 2 * np.pi]), amplitudes)
-    first, last = np.moveaxis(np.reshape(ends, (-1, *ends.shape[-2:])), 1, 0)
-    change = last - first
+    change, tolerance = _change_per_cycle(gait, amplitudes)
+    change = change.reshape(-1, change.shape[-1])
     turns = np.zeros(change.shape, int)
     for k in periodic_axes(periods):
         turns[:, k] = np.round(change[:, k] / periods[k])
         change[:, k] -= turns[:, k] * periods[k]
-    size = max(1.0, float(np.abs(ends).max(initial=0.0)))
-    if np.abs(change).max(initial=0.0) > CLOSED * size or (turns != turns[:1]).any():
+    if np.abs(change).max(initial=0.0) > tolerance or (turns != turns[:1]).any():
         k = int(np.abs(change).max(0).argmax())
         raise Refusal(
-            f"the gait is not closed: alpha_{k + 1} starts at {first[0, k]:.4g} and "
-            f"ends at {last[0, k]:.4g}",
+            f"the gait is not closed: alpha_{k + 1} ends"
+            f" {np.abs(change[:, k]).max():.4g} rad from its start, whole periods left"
+            " out",
             instead="let each variable return, or advance by whole periods at every "
             "amplitude",
         )
@@ -140,8 +141,21 @@ def winding(
 def ends_differ(gait: Any) -> bool:
     """Return whether a gait ends at other angles than it starts at, as one that winds
     around a variable with a period does."""
-    if not hasattr(gait, "shape"):
-        return False
-    first, last = gait.shape(np.array([0.0, 2 * np.pi]))
-    size = max(1.0, float(np.abs(last).max(initial=0.0)))
-    return bool(np.abs(last - first).max(initial=0.0) > CLOSED * size)
+    change, _ = _change_per_cycle(gait)
+    return bool(np.abs(change).max(initial=0.0) > SHORTEST)
+
+
+def _change_per_cycle(
+    gait: Any, amplitudes: ArrayLike | None = None
+) -> tuple[np.ndarray, float]:
+    """Return the change (..., d) of each variable in a cycle, and below what it is
+    none."""
+    gait = getattr(gait, "command", gait)  # of joints that give way
+    if hasattr(gait, "shape"):
+        ends = gait.shape(np.array([0.0, 2 * np.pi]), amplitudes)
+        size = max(1.0, float(np.abs(ends).max(initial=0.0)))
+        return ends[..., 1, :] - ends[..., 0, :], CLOSED * size
+    # A gait that has only cycles does not tell its end: its rates do, less exactly.
+    phases = max(64, 8 * getattr(gait, "harmonics", 1))
+    _, alphadot = gait.cycle(phases, amplitudes)
+    return 2 * np.pi * alphadot.mean(-2), SHORTEST

@@ -246,6 +246,7 @@ class Table:
             frame=stored.frame,
             unit=stored.unit,
             labels=tuple((name, "rad") for name in stored.shapes),
+            periods=stored.connection.periods,
         )
         if self.tube is None:
             return traits
@@ -305,7 +306,9 @@ class Table:
         d): (..., 3). Near a measured gait they are the same everywhere."""
         speed = np.linalg.norm(alphadot, axis=-1)[..., None]
         if self.tube is None:
-            return Field(self.stored.table.axes, values, 1)(alpha) * speed
+            table = self.stored.table
+            field = Field(table.axes, values, 1, periods=table.periods)
+            return field(alpha) * speed
         # The data may reach no point of the grid.
         known = values[:, np.isfinite(values[0])]
         if not known.size:

@@ -15,7 +15,12 @@ from geomech.mathematics.gaits import Gait
 from geomech.mathematics.geometry.connection import SAMPLES_TOGETHER
 from geomech.mathematics.geometry.curvature import ccf
 from geomech.mathematics.geometry.gait import checked_gait
-from geomech.mathematics.geometry.loop_at_rest import NODES, wound_area
+from geomech.mathematics.geometry.loop_at_rest import (
+    NODES,
+    STEPS,
+    wound_area,
+    wound_area_by,
+)
 from geomech.mathematics.geometry.periods import winding
 from geomech.mathematics.geometry.representations.field import Field
 from geomech.mathematics.geometry.two_form import (
@@ -109,12 +114,7 @@ def _wound_plan(system, numerics, gait, numbers: int, read: int) -> Plan:
 
     numbers, read: entries of `Plan`."""
     if fitted.is_too_large(system, numerics):
-        raise Refusal(
-            "the area of a gait that winds around a variable with a period needs a "
-            f"field, and one of {numerics.grid}^{system.joints} shapes is too large",
-            instead=f"lower [numerics] grid, to {fitted.finest_grid(system.joints)} or "
-            "less, or use path or direct",
-        )
+        return _wound_plan_without_field(system, numerics, gait)
 
     def strips(table, amplitudes, tips):
         return wound_area(table, gait, amplitudes, numerics.phases, tips)
@@ -130,6 +130,24 @@ def _wound_plan(system, numerics, gait, numbers: int, read: int) -> Plan:
         numbers=numbers,
         read=read * nodes,
     )
+
+
+def _wound_plan_without_field(system, numerics, gait) -> Plan:
+    """Return `_wound_plan` with A solved on the strips alone."""
+    A = fitted.without_field(system, numerics)
+    phases = max(AROUND, 4 * gait.harmonics + 2)
+
+    def strips(table, amplitudes, tips):
+        periods = system.traits.periods
+        return wound_area_by(A, gait, periods, amplitudes, phases, tips)
+
+    def balances(count, _):
+        # A and its differences on a strip; twice that on those through other loops.
+        on_strip = 5 * RADII * phases + STEPS
+        shapes = 2 * (phases + on_strip) + TIPS * 2 * on_strip
+        return count * shapes * fitted.balances_per_shape(system, numerics)
+
+    return _surface_plan(strips, gait, balances=balances)
 
 
 def _plan_without_field(system, numerics, gait) -> Plan:

@@ -153,9 +153,9 @@ class Ccf(Question):
         facts["interpolation"] = ccf.degree
         labels = shape_labels(self.scene.system)
         found = [
-            *fields.coordinates(ccf.axes, labels),
+            *fields.coordinates(ccf.axes, labels, ccf.periods),
             fields.ccf_variable(ccf, tables.curvature_error),
-            *shape_space.zero_line(ccf, self.scene.gait.middle),
+            *shape_space.zero_line(ccf, self.scene.gait),
         ]
         if space.enclosed is not None:
             found += shape_space.enclosed_area(space.enclosed)

@@ -270,6 +270,12 @@ def refuse(scene: Scene) -> None:
                 because="with springs a gait is only a command",
                 instead="remove the effect springs, or use 'geomech ccf'",
             )
+        if system.traits.periods:
+            raise Refusal(
+                "a chart is of gaits whose shape variables all return",
+                because="one of this body repeats, and gaits wind around it",
+                instead="use 'geomech ccf' and 'geomech displacement'",
+            )
         if capability(system, Drawable) is None:
             raise Refusal(
                 "this system has no body to draw", instead="use 'geomech ccf'"

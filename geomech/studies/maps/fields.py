@@ -12,13 +12,14 @@ import numpy as np
 
 from geomech.core.variables import Result, Variable
 from geomech.io.tables import FORMATS, LAYOUTS
-from geomech.io.tables.base import UNKNOWN_FRAME, body_text
+from geomech.io.tables.base import PERIOD, UNKNOWN_FRAME, body_text
 from geomech.io.tables.netcdf import SHAPE
 from geomech.mathematics.geometry import two_form
 from geomech.mathematics.geometry.connection import Connection
 from geomech.mathematics.geometry.curvature import ccf, exterior_derivative
 from geomech.mathematics.geometry.metric import Finsler, Metric
 from geomech.mathematics.geometry.minimum_perturbation import minimum_perturbation
+from geomech.mathematics.geometry.periods import Periods, periodic_axes
 from geomech.mathematics.geometry.representations.field import Field
 from geomech.mathematics.geometry.representations.harmonics import Harmonics
 from geomech.mathematics.geometry.representations.tube import TaylorSeries, Tube
@@ -112,14 +113,15 @@ def struct_result(study: SceneTables) -> Result:
 def _result(study: SceneTables, found: Sequence[Variable]) -> Result:
     """Return variables of a study with their coordinates and conventions."""
     labels = shape_labels(study.scene.system)
-    axes = coordinates(study.fitted.axes, labels)
+    axes = coordinates(study.fitted.axes, labels, study.fitted.periods)
     return Result("connection", (*axes, *found), attributes(study))
 
 
 def connection_result(fitted: Connection, shapes: Sequence[str] = ()) -> Result:
     """Return A, its fit residual and the rms of xi of a connection without a scene.
     shapes: names of the shape variables, where these are not joint angles."""
-    axes = coordinates(fitted.axes, _angle_labels(fitted.axes, shapes))
+    labels = _angle_labels(fitted.axes, shapes)
+    axes = coordinates(fitted.axes, labels, fitted.periods)
     facts: dict[str, Any] = {"sign_of_A": "xi = + A alphadot"}
     if fitted.length is not None:
         facts["body_length"] = float(fitted.length)
@@ -129,7 +131,8 @@ def connection_result(fitted: Connection, shapes: Sequence[str] = ()) -> Result:
 
 def field_result(values: Field, name: str, shapes: Sequence[str] = ()) -> Result:
     """Return a field; with rows x, y and theta it is a CCF, in its units."""
-    axes = coordinates(values.axes, _angle_labels(values.axes, shapes))
+    labels = _angle_labels(values.axes, shapes)
+    axes = coordinates(values.axes, labels, values.periods)
     lead = values.values.shape[: -values.joints]
     if lead == (3,):
         field = ccf_variable(values, name=name)
@@ -169,9 +172,16 @@ def save_connection(path: str | Path, study: SceneTables, **settings: str) -> No
 
 def check_joints(scene: Scene, file: Callable | None) -> None:
     """Refuse a body of more or fewer joints than a format (`geomech.io.tables.FORMATS`)
-    takes; None is no format."""
+    takes, or with periods that it does not store; None is no format."""
     required = getattr(file, "joints", None)
     joints = scene.system.joints
+    stores_periods = file is None or getattr(file, "periods", False)
+    if scene.system.traits.periods and not stores_periods:
+        raise Refusal(
+            f"a {file.suffix} file stores no periods of shape variables",
+            where=scene.name,
+            instead="write a .nc file",
+        )
     if required in (None, joints):
         return
     raise Refusal(
@@ -611,10 +621,13 @@ def angle_names(axes) -> tuple[str, ...]:
 
 
 def coordinates(
-    axes: Sequence[np.ndarray], labels: Sequence[tuple[str, str]]
+    axes: Sequence[np.ndarray],
+    labels: Sequence[tuple[str, str]],
+    periods: Periods = (),
 ) -> list[Variable]:
-    """Return components, joints and the axes of shape space. labels: (name, unit) of
-    each shape variable; alpha_k is the angle between two links."""
+    """Return components, joints and the axes of shape space, and periods of axes.
+    labels: (name, unit) of each shape variable; alpha_k is the angle between two
+    links."""
     found = [
         Variable("component", ("component",), np.array(COMPONENTS)),
         Variable("joint", ("joint",), np.arange(1, len(axes) + 1, dtype="i4")),
@@ -625,6 +638,17 @@ def coordinates(
         if label == name:
             meaning = joint_label(k)
         found.append(Variable(name, (name,), axis, unit, meaning))
+    return found + period_variables(names, periods)
+
+
+def period_variables(names: Sequence[str], periods: Periods) -> list[Variable]:
+    """Return the periods of axes as variables such as period_alpha_2, for those that
+    have one. names: of the axes."""
+    found = []
+    for k in periodic_axes(periods):
+        label = f"period of {names[k]}, whose axis has the same shape at both ends"
+        name = f"{PERIOD}{names[k]}"
+        found.append(Variable(name, (), periods[k], "rad", label))
     return found
 
 

@@ -13,6 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from geomech.core.variables import Result, Variable
+from geomech.mathematics.gaits import Gait
+from geomech.mathematics.geometry.periods import ends_differ, period_of
 from geomech.mathematics.geometry.representations.field import Field
 from geomech.mathematics.geometry.representations.plane import Plane
 from geomech.mathematics.geometry.stretch import Stretch
@@ -323,10 +325,12 @@ def slice_variables(planes: Sequence[Plane]) -> list[Variable]:
     """Return the axes of planes, and the shapes through which they go, such as
     slice_1_3."""
     axes: dict[str, np.ndarray] = {}
+    periods: dict[str, float | None] = {}
     shapes = []
     for plane in planes:
         _, *angles = plane_dims(plane)
         axes.update(zip(angles, plane.connection.axes))
+        periods.update(zip(angles, plane.connection.periods or (None, None)))
         name = f"slice{joint_suffix(plane)}"
         label = "shape through which the plane goes"
         shapes.append(Variable(name, ("joint",), plane.at, "rad", label))
@@ -335,7 +339,8 @@ def slice_variables(planes: Sequence[Plane]) -> list[Variable]:
     joints = np.arange(1, len(planes[0].at) + 1)
     component = Variable("component", ("component",), [*COMPONENTS])
     joint = Variable("joint", ("joint",), joints)
-    return [component, joint, *coordinates, *shapes]
+    around = fields.period_variables([*periods], tuple(periods.values()))
+    return [component, joint, *coordinates, *around, *shapes]
 
 
 def joint_suffix(plane: Plane) -> str:
@@ -350,14 +355,22 @@ def plane_dims(plane: Plane) -> tuple[str, str, str]:
     return ("component", f"alpha_{i}", f"alpha_{j}")
 
 
-def zero_line(ccf: Field, middle: np.ndarray) -> list[Variable]:
+def zero_line(ccf: Field, gait: Gait) -> list[Variable]:
     """Return how far from the gait's middle the x component changes sign: the nearest
     and the farthest place, and the share of directions in which there is one; nan
-    without any. Nothing for a field with gaps, or one that is zero."""
-    x = Field(ccf.axes, ccf.values[0], ccf.degree)
-    if x.masked or np.abs(x.values).max() < ROUNDING:
+    without any. Nothing for a field with gaps, or one that is zero, or for a gait that
+    winds around a variable and so has no middle."""
+    x = Field(ccf.axes, ccf.values[0], ccf.degree, periods=ccf.periods)
+    if x.masked or np.abs(x.values).max() < ROUNDING or ends_differ(gait):
         return []
-    reach = min(min(axis[-1] - m, m - axis[0]) for axis, m in zip(x.axes, middle))
+    middle = gait.middle
+    reach = np.inf
+    for k, (axis, m) in enumerate(zip(x.axes, middle)):
+        period = period_of(ccf.periods, k)
+        if period is None:
+            reach = min(reach, axis[-1] - m, m - axis[0])
+        else:
+            reach = min(reach, period / 2)
     has_zero_line, distances = _sign_changes(x, middle, reach)
     nearest = farthest = np.nan
     if has_zero_line.any():

@@ -326,6 +326,7 @@ def ccf_variables(tables: SceneTables) -> list[Variable]:
     found = [Variable("component", ("component",), [*COMPONENTS])]
     for name, axis, (label, unit) in zip(GRID[1:], tables.curvature.axes, labels):
         found.append(Variable(name, (name,), axis, unit, f"{label} on the map"))
+    found += fields.period_variables(GRID[1:], tables.curvature.periods)
     return [*found, replace(ccf, dims=GRID)]
 
 
