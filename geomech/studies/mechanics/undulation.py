@@ -190,7 +190,10 @@ def loaded(scene: Any, subject: str) -> Loaded:
         body = capability(system, Loaded)
     if body is None:
         given = scene if system is None else system
-        raise Refusal(f"{subject} needs a body in a medium, got a {kind_of(given)}")
+        what = f"{subject} needs a body in a medium, got a {kind_of(given)}"
+        if hasattr(getattr(given, "body", None), "leg_points"):
+            what = f"{subject} is computed of bodies without legs"
+        raise Refusal(what)
     return body
 
 
