@@ -62,7 +62,6 @@ class Traits:
     mirror: bool = False
     reversible: bool = False
     smooth: bool = True
-    jumps: bool = False
     power_degree: float | None = None
     lacks: Premise = NONE
     singularity: Callable | None = None
@@ -74,6 +73,7 @@ class Traits:
     frequency: float | None = None
     compliant: bool = False
     periods: tuple[float | None, ...] = ()
+    jumps: bool = False
 
     def __post_init__(self):
         periods = checked_periods(self.periods, len(self.periods))
