@@ -14,6 +14,7 @@ from geomech.mathematics.gaits import Circle, Fourier, Gait, Wave, Wound
 from geomech.mathematics.geometry import connection, curvature, family
 from geomech.mathematics.geometry.gait import loop_area
 from geomech.mathematics.geometry.loop_at_rest import wound_area, wound_area_by
+from geomech.mathematics.geometry.traits import Traits
 from geomech.mathematics.geometry.two_form import spanned, spanned_by, two_form
 from geomech.mathematics.tiers.area import area
 from geomech.mathematics.tiers.direct import direct
@@ -299,6 +300,31 @@ def test_told_errors_of_tiers_cover_the_true_ones(system):
         found = result[name]
         true = np.abs(found.values - truth[:, k])
         assert (true <= found.error + 1e-12).all()
+
+
+@pytest.mark.parametrize("turning", [0.0, 1.0])
+def test_told_errors_cover_switches_between_phases(turning):
+    """A contact switches at once, at 20 random pairs of phases: x and the heading are
+    those of the shapes at the two switches."""
+    rng = np.random.default_rng(3)
+    gait = Fourier(cos=((1.0,),), sin=((0.3,),))
+    for first, duty in zip(rng.uniform(0, TURN, 20), rng.uniform(0.2, 0.8, 20)):
+
+        def switching(alpha, alphadot, first=first, last=duty * TURN):
+            touches = np.mod(alpha[..., 1] - first, TURN) < last
+            moved = touches * alphadot[..., 0]
+            return np.stack([(1 - turning) * moved, 0 * moved, turning * moved], -1)
+
+        switching.traits = Traits(
+            linear=True, smooth=False, jumps=True, periods=(None, TURN)
+        )
+        result = geomech.study(switching, gait, extent=1.0, grid=15).displacement(
+            [0.2, 0.5], tiers=["area", "path", "direct"]
+        )
+        start, end = gait.shape(np.array([first, first + duty * TURN]), 1.0)[:, 0]
+        name = "heading" if turning else "x"
+        true = np.array([0.2, 0.5]) * (end - start)
+        assert (np.abs(result[name].values - true) <= result[name].error).all()
 
 
 def test_a_search_over_loops_is_refused():

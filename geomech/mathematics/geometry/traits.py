@@ -29,6 +29,8 @@ class Traits:
     smooth : xi has no kinks in shape or direction, so that errors fall faster than with
         the
         square of the phases.
+    jumps : xi jumps between some shapes, as where a contact switches at once. Errors
+        then allow for switches that fall between two phases.
     power_degree : P(alpha, c alphadot) = c^power_degree P(alpha, alphadot) for c > 0; 2
         in a
         fluid, 1 in sand. None where the system has no power, or a power of no single
@@ -71,6 +73,7 @@ class Traits:
     frequency: float | None = None
     compliant: bool = False
     periods: tuple[float | None, ...] = ()
+    jumps: bool = False
 
     def __post_init__(self):
         periods = checked_periods(self.periods, len(self.periods))

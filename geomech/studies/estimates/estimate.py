@@ -140,10 +140,35 @@ def _direct_group(
     error += _model_error(system, quarter, run.xi[..., ::4, :], quarter_net)
     still_to_come = np.asarray(run.to_come)[..., None]
     error += still_to_come + table_error(system, *every_nth_phase(2, shapes))
+    if system.traits.jumps:
+        error += jump_error(run.xi, length)
 
     by_pieces = pieces_error(scene, shapes, quarter, quarter_net)
     by_elements = elements_error(system, quarter, quarter_net)
     return run.net, error, by_pieces, by_elements
+
+
+def jump_error(xi: np.ndarray, length: float) -> np.ndarray:
+    """Return the error (..., 2), body lengths and rad, from jumps of the velocity xi
+    (..., N, 3) that fall between two phases.
+
+    A sum over phases places a jump by half a step at most from where it is. What a
+    step changes beyond the two steps beside it counts as a jump: a smooth change does
+    not."""
+    step = 2 * np.pi / xi.shape[-2]
+    changes = np.diff(xi, axis=-2, append=xi[..., :1, :])
+    position = np.linalg.norm(changes[..., :2], axis=-1)
+    heading = np.abs(changes[..., 2])
+
+    def moved(change):
+        beside = np.roll(change, 1, -1) + np.roll(change, -1, -1)
+        return step / 2 * np.maximum(change - beside, 0.0).sum(-1)
+
+    turned = moved(heading)
+    # A heading that is off turns the rest of the path about the place of the jump.
+    path = step * np.linalg.norm(xi[..., :2], axis=-1).sum(-1)
+    distance = moved(position) + path * turned
+    return np.stack([distance / length, turned], -1)
 
 
 def _nets_with_fewer_phases(system, shapes, run) -> list[np.ndarray]:
