@@ -83,6 +83,9 @@ MEDIA = {name: entry.medium for name, entry in CATALOGUE.items()}
 # Radii of end caps over the shortest link (assumed), and over a continuous body.
 SMALLEST_CAP = 0.02
 SMALLEST_CAP_OF_BODY = 0.008
+# Phase over which contact comes or goes, rad, that counts as a jump: a step of 64
+# phases.
+SUDDEN = 0.1
 
 
 @SYSTEMS.register
@@ -243,6 +246,7 @@ class Swimmer:
             frame=getattr(body, "frame", MEAN),
             labels=getattr(self.touching_body, "shape_labels", ()),
             periods=getattr(self.touching_body, "shape_periods", ()),
+            jumps=_switch(self.contact or body) < SUDDEN,
             frequency=frequencies[0] if frequencies else None,
             compliant=is_compliant,
         )
@@ -735,6 +739,12 @@ def note_radius(swimmer: Swimmer) -> None:
             UnitWarning,
             stacklevel=4,
         )
+
+
+def _switch(part: Any) -> float:
+    """Return the phase over which contact comes or goes, rad; inf for a body or a rule
+    of contact without such a phase."""
+    return getattr(part, "rise", np.inf)
 
 
 def _has_joint_angles(body: rft.Body) -> bool:
