@@ -106,14 +106,16 @@ def field_of(result: Result, name: str) -> tuple[Field, Field | None]:
     variable = result[name]
     axes = axes_of(result, variable.dims[1:])
     degree = degree_of(result)
-    more = {
-        "unit": length_unit(variable),
-        "periods": periods_of(result, variable.dims[1:]),
-    }
+    unit = length_unit(variable)
+    periods = periods_of(result, variable.dims[1:])
+
+    def field(values: np.ndarray) -> Field:
+        return Field(axes, values, degree, unit=unit, periods=periods)
+
     error = None
     if variable.error is not None:
-        error = Field(axes, variable.error, degree, **more)
-    return Field(axes, variable.values, degree, **more), error
+        error = field(variable.error)
+    return field(variable.values), error
 
 
 def connection_of(result: Result, name: str = "A") -> Connection:

@@ -140,7 +140,8 @@ class Wound(Gait):
 
     def with_elements(self, count: int) -> Wound:
         """Return the gait of a body of ``count`` elements, where the gait is one."""
-        return Wound(self.gait.with_elements(count), self.turns, self.periods)
+        inner: Any = self.gait
+        return Wound(inner.with_elements(count), self.turns, self.periods)
 
 
 def _joined(own: np.ndarray, further: np.ndarray) -> np.ndarray:
@@ -164,6 +165,7 @@ def wound_for(gait: Any, joints: int, periods: Periods) -> Any:
         return gait
     inner = unwound(gait)
     own = inner.joints
-    if not own < joints or not periods or None in periods[own:]:
+    further = [period for period in periods[own:] if period is not None]
+    if not own < joints or not periods or len(further) < joints - own:
         return inner
-    return Wound(inner, (1,) * (joints - own), periods[own:])
+    return Wound(inner, (1,) * (joints - own), tuple(further))
