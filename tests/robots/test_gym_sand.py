@@ -274,6 +274,36 @@ def test_the_error_of_actions_falls_with_the_time_step(make):
     assert 0 < coarse.elements < coarse.moved
 
 
+def test_a_urdf_stands_on_the_force_of_its_weight(make, tmp_path):
+    """A box of 0.5 kg, with a freejoint and a motor that MjSpec adds; without these the
+    file has no actuators."""
+    size = '<geometry><box size="0.1 0.1 0.02"/></geometry>'
+    text = f"""<robot name="r"><link name="base"><inertial><mass value="0.5"/>
+<inertia ixx="1e-3" iyy="1e-3" izz="1e-3" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision name="sole">{size}</collision><visual>{size}</visual></link></robot>"""
+    path = tmp_path / "robot.urdf"
+    path.write_text(text)
+    with pytest.raises(ValueError, match="the robot has no actuators"):
+        geomech.gym.SandEnv(path)
+    spec = mujoco.MjSpec.from_file(str(path))
+    spec.compiler.fusestatic = False
+    base = spec.body("base")
+    base.add_freejoint(name="free")
+    base.pos = [0, 0, 0.02]
+    spec.add_actuator(
+        target="free",
+        trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        gear=[1, 0, 0, 0, 0, 0],
+        ctrlrange=[-1, 1],
+        ctrllimited=True,
+    )
+    env = make(spec.compile(), "sole")
+    run(env, np.zeros((50, 1)))
+    mujoco.mj_forward(env.model, env.data)
+    force = env.sand.forces(env.data)
+    np.testing.assert_allclose(force, [[0, 0, 0.5 * 9.81]], atol=1e-3)
+
+
 def bad(**options):
     return lambda: geomech.gym.SandEnv(QUADRUPED, **options)
 
