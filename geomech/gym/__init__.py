@@ -22,13 +22,15 @@ from rft.core.refusal import Refusal
 if TYPE_CHECKING:
     from geomech.gym.hexapod import HexapodSand, HexapodSands
     from geomech.gym.sand import SandEnv, SandVectorEnv
+    from geomech.gym.state import State
 
-__all__ = ["HexapodSand", "HexapodSands", "SandEnv", "SandVectorEnv"]
+__all__ = ["HexapodSand", "HexapodSands", "SandEnv", "SandVectorEnv", "State"]
 MODULES = {
     "HexapodSand": "geomech.gym.hexapod",
     "HexapodSands": "geomech.gym.hexapod",
     "SandEnv": "geomech.gym.sand",
     "SandVectorEnv": "geomech.gym.sand",
+    "State": "geomech.gym.state",
 }
 
 # Missing packages are named at the first use.

@@ -95,7 +95,7 @@ class SandEnv(gymnasium.Env):
         As of `rft.mujoco.attach`.
     observation : str or function
         "state" (`geomech.gym.trunk.observation`), "sensors" (those of the MJCF), or a
-        function of a `geomech.gym.state.State` that returns a row of numbers (..., n).
+        function of a `State` that returns a row of numbers (..., n).
     reward : dict or function
         Weights of parts: "forward", progress of the trunk along x, m/s; "effort", power
         of the actuators, W; "fall", lost where the episode terminates. Or a function of
@@ -114,7 +114,7 @@ class SandEnv(gymnasium.Env):
     control_rate : float
         Change of the controls per second for the action 1; None for actions that set
         the controls, scaled to the ctrlrange.
-    **sand
+    **sand : Any
         Further arguments of `rft.mujoco.attach`, such as slope, element or footprints.
 
     Notes

@@ -102,7 +102,9 @@ def upright(joints: Joints, qpos: np.ndarray) -> np.ndarray:
     if joints.trunk is None:
         return np.ones(qpos.shape[:-1])
     place = joints.trunk[0]
-    return rotation(qpos[..., place + 3 : place + 7])[..., 2, 2]
+    x = qpos[..., place + 4]
+    y = qpos[..., place + 5]
+    return 1 - 2 * (x * x + y * y)
 
 
 @dataclass(frozen=True)

@@ -251,6 +251,18 @@ def test_many_robots_go_as_each_alone(options, make):
     many.close()
 
 
+@needs_batch
+def test_a_function_for_one_robot_is_refused_for_many():
+    many = geomech.gym.SandVectorEnv(
+        QUADRUPED, 3, geoms=GEOMS, observation=lambda state: state.qpos[2:]
+    )
+    with pytest.raises(ValueError, match=r"\(3, 9\), not \(1, 11\): index the last"):
+        many.reset(seed=0)
+    with pytest.raises(ValueError, match=r"have the shape \(3, 4\), not \(4,\)"):
+        many.step(np.zeros(4))
+    many.close()
+
+
 def test_the_error_of_actions_falls_with_the_time_step(make):
     """As its order says, and is the distance to a finer run; the episode stays as it
     is."""
@@ -309,7 +321,9 @@ def bad(**options):
 
 
 WRONG = {
-    "there is no MJCF file none.xml": lambda: geomech.gym.SandEnv("none.xml"),
+    "there is no MJCF file none.xml: it is looked for in": lambda: geomech.gym.SandEnv(
+        "none.xml"
+    ),
     "xml is not an MJCF that MuJoCo can read": lambda: geomech.gym.SandEnv("<mu>"),
     "xml must be the name of an MJCF file, its text": lambda: geomech.gym.SandEnv(3),
     "the model has no geom 'leg-\\*': did you mean 'leg_": bad(geoms=["leg-*"]),

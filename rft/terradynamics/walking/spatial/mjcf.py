@@ -369,8 +369,9 @@ def read_model(file: str | Path):
 def _require_readable(file: str | Path, path: Path) -> None:
     """Raise Refusal unless a file exists, is an ordinary one of a usual size, and can
     be read."""
+    cure = "" if path.is_absolute() else f"it is looked for in {Path.cwd()}"
     try:
-        require(path.exists(), f"there is no MJCF file {file}")
+        require(path.exists(), f"there is no MJCF file {file}", instead=cure)
         require(path.is_file(), f"{file} is not an ordinary file")
         require(
             path.stat().st_size <= LARGEST_FILE,
