@@ -50,6 +50,7 @@ PACKAGES = {
         "rft.fits.plates",
         "rft.mujoco",
     ],
+    "Robots that learn": ["geomech.gym"],
     "Simulated grains": ["rft.grains"],
 }
 

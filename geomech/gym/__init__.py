@@ -1,10 +1,11 @@
-"""Environments of Gymnasium in which robots learn to walk in sand. Importing this
+"""Environments of Gymnasium in which robots learn to move in sand. Importing this
 module registers them. Needs the extra `gym`.
 
     import gymnasium
     import geomech.gym
 
-    env = gymnasium.make("geomech/HexapodSand-v0")
+    env = gymnasium.make("geomech/Sand-v0", xml="robot.xml", geoms=["leg_*"])
+    hexapod = gymnasium.make("geomech/HexapodSand-v0")
     many = gymnasium.make_vec(
         "geomech/HexapodSand-v0", num_envs=64, vectorization_mode="vector_entry_point"
     )
@@ -20,13 +21,28 @@ from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
     from geomech.gym.hexapod import HexapodSand, HexapodSands
+    from geomech.gym.sand import SandEnv, SandVectorEnv
+    from geomech.gym.state import State
 
-__all__ = ["HexapodSand", "HexapodSands"]
+__all__ = ["HexapodSand", "HexapodSands", "SandEnv", "SandVectorEnv", "State"]
+MODULES = {
+    "HexapodSand": "geomech.gym.hexapod",
+    "HexapodSands": "geomech.gym.hexapod",
+    "SandEnv": "geomech.gym.sand",
+    "SandVectorEnv": "geomech.gym.sand",
+    "State": "geomech.gym.state",
+}
 
 # Missing packages are named at the first use.
 with contextlib.suppress(ModuleNotFoundError):
     from gymnasium.envs.registration import register
 
+    register(
+        "geomech/Sand-v0",
+        entry_point="geomech.gym.sand:SandEnv",
+        vector_entry_point="geomech.gym.sand:SandVectorEnv",
+        max_episode_steps=250,
+    )
     register(
         "geomech/HexapodSand-v0",
         entry_point="geomech.gym.hexapod:HexapodSand",
@@ -40,7 +56,7 @@ def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module 'geomech.gym' has no attribute {name!r}")
     try:
-        return getattr(import_module("geomech.gym.hexapod"), name)
+        return getattr(import_module(MODULES[name]), name)
     except ModuleNotFoundError as error:
         if error.name not in ("gymnasium", "mujoco"):
             raise

@@ -171,6 +171,10 @@ OUTPUTS = ("-o", "--plot")
 @pytest.mark.parametrize("page", WITH_PYTHON.values(), ids=WITH_PYTHON)
 def test_python_on_all_pages_runs(page, tmp_path, capsys, monkeypatch, own_parts):
     monkeypatch.chdir(tmp_path)
+    if "import gymnasium" in text(page):
+        pytest.importorskip("gymnasium", reason="needs: pip install 'geomech[gym]'")
+    for name, code in re.findall(r"(?ms)^```\w+ ([\w.-]+)\n(.*?)^```$", text(page)):
+        (tmp_path / name).write_text(code)
     for code in blocks(page, "python"):
         # A custom law is of no module, whose compiled code an earlier run could keep.
         how = "numpy" if "@formula" in code else backend.preferred()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from geomech import scenes
+from rft.core.notes import Note
 from rft.terradynamics.meshes import Spatial
 from rft.terradynamics.walking import Fineness, Mjcf, Tripod, Walker
 
@@ -15,6 +16,8 @@ mujoco = pytest.importorskip(
     "mujoco", reason="needs the extra: pip install 'geomech[mujoco]'"
 )
 pytestmark = pytest.mark.usefixtures("fastest")
+from rft.mujoco import attach  # noqa: E402
+from rft.terradynamics.meshes.geoms import geom_name  # noqa: E402
 from rft.terradynamics.walking.mujoco_walk import Simulation  # noqa: E402
 from rft.terradynamics.walking.spatial import geoms  # noqa: E402
 
@@ -133,6 +136,38 @@ def test_geoms_become_triangles_of_their_size(kind, volume, size):
     corners = surface.corners.reshape(-1, 3)
     middle = (corners.min(0) + corners.max(0)) / 2
     np.testing.assert_allclose(middle, [0.1, 0.2, 0.3], atol=1e-3)
+
+
+def test_patterns_and_bodies_mean_the_geoms_that_they_mean_to_attach(cart):
+    """Also geoms without a name; a pattern leaves out what touches nothing, with a
+    note, and a robot that is read again has the same geoms."""
+    shown = '<geom name="fshow" type="sphere" size="0.01" contype="0" conaffinity="0"/>'
+    text = CART.replace("</body></worldbody>", f"{shown}</body></worldbody>")
+    text = text.replace('<geom name="rr" ', "<geom ")
+    text = text.replace(
+        '<body pos="-0.05 -0.05 0"', '<body name="back_rr" pos="-0.05 -0.05 0"'
+    )
+    file = cart / "parts" / "cart.xml"
+    file.write_text(text)
+    scene = SCENE.replace(
+        '"fl", "fr", "rl", "rr", "trunk"', '"f*", "rl", "back_*", "rl"'
+    )
+    with pytest.raises(ValueError, match="geoms lists a name twice"):
+        scenes.parse(scene, str(cart / "cart.toml"))
+    (cart / "cart.toml").write_text(scene.replace(', "rl"]', "]"))
+    with pytest.warns(Note, match="'fshow', which touches nothing"):
+        robot = scenes.load(cart / "cart.toml").robot
+    model = mujoco.MjModel.from_xml_path(str(file))
+    with pytest.warns(Note), attach(model, "poppy-seeds-loose", robot.geoms) as sand:
+        names = sand.geoms
+    found = [geom_name(model, geom) for geom in robot.geom_numbers]
+    assert tuple(found) == names and len(names) == 4
+    assert len(robot.surfaces(8)) == 4
+    again = pickle.loads(pickle.dumps(robot))
+    np.testing.assert_array_equal(again.geom_numbers, robot.geom_numbers)
+    with pytest.raises(ValueError, match="has no geom 'leg_.'") as refused:
+        Mjcf(str(file), ("leg_*",))
+    assert str(refused.value).startswith(str(file))
 
 
 def test_a_machine_is_known_by_what_it_includes_too(cart):

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import difflib
 import hashlib
+import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
@@ -13,6 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from rft.core.checks import in_range, real_array
+from rft.core.notes import Note
 from rft.core.refusal import Refusal, formatted, located, require
 from rft.terradynamics.walking.robot import Robot
 from rft.terradynamics.walking.spatial.facets import Surface
@@ -29,8 +31,9 @@ MISSING = "an MJCF needs MuJoCo: pip install 'geomech[mujoco]'"
 class Mjcf(Robot):
     """A robot of an MJCF file, walking along x, the ground at z = 0.
 
-    mjcf (-): name of the file, relative to the folder of a scene file. geoms (-): names
-    of the geoms that touch the ground, and of no others. actuators (-): names of the
+    mjcf (-): name of the file, relative to the folder of a scene file. geoms (-): the
+    geoms that touch the ground, and no others: names of geoms or of their bodies, and
+    patterns such as "leg_*". actuators (-): names of the
     <position> or <velocity> actuators that the clock of the gait drives; by default all
     of them. phases (-): phase of each of these actuators, in cycles; by default 0.
 
@@ -64,7 +67,8 @@ class Mjcf(Robot):
         model, digest = _compile_model(self.mjcf)
         object.__setattr__(self, "digest", digest)
         object.__setattr__(self, "model", model)
-        self._find_geoms()
+        for note in self._find_geoms():
+            warnings.warn(f"{self.mjcf}: {note}", Note, stacklevel=3)
         self._find_driven()
 
     def _check_names(self, field_name: str) -> None:
@@ -99,9 +103,9 @@ class Mjcf(Robot):
         """Mass of all bodies, kg."""
         return float(self.model.body_mass.sum())
 
-    def _find_geoms(self) -> None:
-        """Set the numbers of the geoms; ValueError for unknown ones and for those of
-        the world."""
+    def _find_geoms(self) -> list[str]:
+        """Set the numbers of the geoms, and return notes about those that are left out;
+        ValueError for unknown ones, and those of the world."""
         model = self.model
         require(
             model.nv > 0,
@@ -109,18 +113,12 @@ class Mjcf(Robot):
             where=self.mjcf,
             because="it has no joints",
         )
-        numbers = []
-        for name in self.geoms:
-            geom = self._number("geom", name, model.ngeom)
-            fixed = model.body_weldid[model.geom_bodyid[geom]] == 0
-            require(
-                not fixed,
-                f"the geom {formatted(name)} is fixed to the world",
-                where=self.mjcf,
-                instead="list geoms of the robot",
-            )
-            numbers.append(geom)
+        from rft.mujoco.ground.selection import choose_geoms
+
+        with located(self.mjcf):
+            numbers, notes = choose_geoms(model, self.geoms)
         object.__setattr__(self, "geom_numbers", np.array(numbers))
+        return notes
 
     def _number(self, kind: str, name: str, count: int) -> int:
         """Return the number of the model's geom or actuator of a name; a ValueError
@@ -220,17 +218,19 @@ class Mjcf(Robot):
     def surfaces(self, elements: int) -> list[Surface]:
         """Return the surfaces of the geoms, with ``elements`` edges around round
         ones."""
+        from rft.terradynamics.meshes.geoms import geom_label
         from rft.terradynamics.walking.spatial import geoms
 
         in_range("elements", elements, 4, 1000, whole=True)
         out = []
-        for name, geom in zip(self.geoms, self.geom_numbers):
+        for geom in self.geom_numbers:
             try:
                 mesh = geoms.geom_mesh(self.model, geom, elements)
                 out.append(geoms.surface(self.model, geom, mesh))
             except ValueError as error:
+                label = geom_label(self.model, geom)
                 raise Refusal(
-                    f"geom {formatted(name)}", where=self.mjcf, because=str(error)
+                    f"geom {label}", where=self.mjcf, because=str(error)
                 ) from None
         return out
 
@@ -332,6 +332,19 @@ def _whole_number(text: str | None) -> int:
 def _compile_model(file: str):
     """Return the model of a file and its digest; ValueError of one line if MuJoCo
     cannot read the file, or its model is no robot on the ground."""
+    model = read_model(file)
+    _require_sound(file, model)
+    import mujoco
+
+    # Included files and meshes are part of the content.
+    content = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, content)
+    return model, hashlib.sha256(content).hexdigest()[:16]
+
+
+def read_model(file: str | Path):
+    """Return the compiled model of an MJCF or URDF file; Refusal of one line where
+    MuJoCo cannot read it, or where it would take long."""
     try:
         import mujoco
     except ImportError:
@@ -344,26 +357,21 @@ def _compile_model(file: str):
     with located(file):
         require_bounded(path)
     try:
-        model = mujoco.MjModel.from_xml_path(str(path))
+        return mujoco.MjModel.from_xml_path(str(path))
     # MuJoCo raises many kinds of errors for a file that is no MJCF.
     except Exception as error:
         message = " ".join(str(error).split())
         raise Refusal(
             f"{file} is not an MJCF file that MuJoCo can read", because=message[:300]
         ) from None
-    _require_sound(file, model)
-
-    # Included files and meshes are part of the content.
-    content = np.empty(mujoco.mj_sizeModel(model), np.uint8)
-    mujoco.mj_saveModel(model, None, content)
-    return model, hashlib.sha256(content).hexdigest()[:16]
 
 
-def _require_readable(file: str, path: Path) -> None:
+def _require_readable(file: str | Path, path: Path) -> None:
     """Raise Refusal unless a file exists, is an ordinary one of a usual size, and can
     be read."""
+    cure = "" if path.is_absolute() else f"it is looked for in {Path.cwd()}"
     try:
-        require(path.exists(), f"there is no MJCF file {file}")
+        require(path.exists(), f"there is no MJCF file {file}", instead=cure)
         require(path.is_file(), f"{file} is not an ordinary file")
         require(
             path.stat().st_size <= LARGEST_FILE,
