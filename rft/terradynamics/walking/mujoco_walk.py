@@ -218,6 +218,7 @@ class Simulation:
         law = _spatial_law(walker)
         self.machine = build_machine(walker.robot, numerics.elements, planar, PIECES)
         self.gait = walker.gait
+        self.is_level = walker.rise == 0.0
         # Legs and screws of hardly any mass turn as the clock does, also where its rate
         # jumps.
         self.is_prescribed = not isinstance(walker.robot, Mjcf)
@@ -239,9 +240,16 @@ class Simulation:
         self.body = Multibody(
             self.machine.model,
             self.machine.surfaces,
-            Grains(law, ground.strength, ground.flux, float(rounding)),
+            Grains(
+                law,
+                ground.strength,
+                ground.flux,
+                float(rounding),
+                ground.downhill_loss,
+            ),
             self.clock,
             _substeps(walker, self.machine.model),
+            walker.rise,
         )
         self.clock.set_start(self.body)
         self.intervals = intervals(self.clock.kinks(), numerics.steps)
@@ -445,6 +453,8 @@ class Simulation:
         data = self.body.data
         rotation = data.xmat[self.machine.root].reshape(3, 3)
         yaw = np.arctan2(rotation[1, 0], rotation[0, 0])
+        cos = np.cos(yaw)
+        sin = np.sin(yaw)
         leg_speed = 2 * np.pi * self.gait.frequency * self.reach
         velocities = data.qvel * self.body.size / leg_speed
         positions = []
@@ -455,14 +465,16 @@ class Simulation:
                 positions.append(data.qpos[address + 2] / self.reach)
                 first = model.jnt_dofadr[joint]
                 v_x, v_y = velocities[first : first + 2]
-                velocities[first] = v_x * np.cos(yaw) + v_y * np.sin(yaw)
-                velocities[first + 1] = v_y * np.cos(yaw) - v_x * np.sin(yaw)
+                velocities[first] = v_x * cos + v_y * sin
+                velocities[first + 1] = v_y * cos - v_x * sin
             elif kind == HINGE:
                 angle = data.qpos[address]
                 positions += [np.cos(angle), np.sin(angle)]
             elif kind == SLIDE and abs(model.jnt_axis[joint, 2]) > 0.5:
                 positions.append(data.qpos[address] / self.reach)
-        return np.array([*rotation[2, :2], *velocities, *positions])
+        # On a slope the heading matters.
+        heading = [] if self.is_level else [cos, sin]
+        return np.array([*rotation[2, :2], *heading, *velocities, *positions])
 
     def unwound(self, strides: int) -> np.ndarray:
         """Return qpos less the full turns of hinges that the clock drives in

@@ -122,11 +122,13 @@ def batch_strides(
     grounds = [w.ground for w in walkers]
     strength = np.array([g.strength * w.stress.zeta for g, w in zip(grounds, walkers)])
     flux = np.array([g.flux for g in grounds])
-    ground = Ground(strength, flux, numerics.rounding, np.sin(stress.grazing))
+    loss = np.array([g.downhill_loss for g in grounds])
+    ground = Ground(strength, flux, numerics.rounding, np.sin(stress.grazing), loss)
 
     designs = [w.robot for w in walkers]
     gaits = [w.gait for w in walkers]
-    robots = Robots(designs, gaits, stress, ground, numerics.elements)
+    slopes = [w.rise for w in walkers]
+    robots = Robots(designs, gaits, stress, ground, numerics.elements, slopes)
     return Strides(robots, designs, gaits, numerics.steps, advance)
 
 
