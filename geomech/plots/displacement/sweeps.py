@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from geomech.mathematics.systems.base import body_size, length_unit
 from geomech.plots.displacement.displacements import draw_measurements, medium_band
 from geomech.plots.look import colours
 from geomech.plots.style import MARKED, figure, quantity, styled
+from geomech.results.scenes import scene_of
 from geomech.scenes.data.measurements import METRES, swept_points
 from geomech.scenes.model import Scene
 from geomech.studies.displacement.cycles import AMPLITUDE
@@ -134,7 +135,7 @@ def sweep_figure(
         )
     if maps:
         check_maps(count, "status" in result)
-        return _maps_of_walks(scene, result)
+        return _maps_of_walks(result)
     if "status" in result:
         return _speed_figure(scene, result, data)
     return _net_figure(scene, result, data)
@@ -396,23 +397,45 @@ def _speed_figure(scene: Any, result: Result, data: Any) -> Figure:
 
 
 @styled
-def _maps_of_walks(scene: Any, result: Result) -> Figure:
+def _maps_of_walks(result: Result) -> Figure:
     """Draw speed, slip and sinkage over two parameters, with the outcomes marked and
     named."""
+    fig, axes = figure(9.6, 3.4, len(MAPPED))
+    handles, names = draw_maps_of_walks(list(axes.ravel()), result)
+    fig.legend(handles, names, loc="outside upper center", ncols=6)
+    return fig
+
+
+@styled
+def draw_maps_of_walks(
+    axes: list[Axes], result: Result, names: Sequence[str] = tuple(MAPPED)
+) -> tuple[list, list[str]]:
+    """Draw maps of a sweep of a robot over two parameters, one on each of some axes;
+    return handles and names of the outcomes for a legend.
+
+    names: what to draw, of speed, slip and sinkage.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> over = {"effects.slope.angle_deg": [0.0, 10.0], "gait.frequency": [1.0, 2.0]}
+    >>> swept = geomech.sweep("xplorer-slope", over)
+    >>> fig, axes = geomech.plots.figure(4.0, 3.0)
+    >>> handles, names = geomech.plots.draw_maps_of_walks(axes[0], swept, ["slip"])
+    >>> names
+    ['walks', 'climbs']
+    """
     over = parameters(result)
     order = np.ix_(*(np.argsort(x, kind="stable") for x in over.values()))
     rising = [np.sort(x) for x in over.values()]
-    labels = axis_labels(scene, list(over), ROBOT_UNITS)
-    fig, axes = figure(9.6, 3.4, len(MAPPED))
-    for ax, (name, words) in zip(axes.ravel(), MAPPED.items()):
+    labels = axis_labels(scene_of(result), list(over), ROBOT_UNITS)
+    for ax, name in zip(axes, names):
         variable = result[name]
         unit = variable.unit if variable.unit != "1" else "-"
-        _draw_map(ax, *rising, variable.values[order], quantity(words, unit))
+        _draw_map(ax, *rising, variable.values[order], quantity(MAPPED[name], unit))
         ax.set(xlabel=labels[0], ylabel=labels[1])
         _scatter_outcomes(ax, result, order, rising, GOOD_MARKS | OUTCOME_MARKS)
-    handles, names = ax.get_legend_handles_labels()
-    fig.legend(handles, names, loc="outside upper center", ncols=6)
-    return fig
+    return axes[0].get_legend_handles_labels()
 
 
 def curves(ax: Axes, values: Any, result: Result, names: Any) -> None:

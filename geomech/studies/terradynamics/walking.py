@@ -280,14 +280,15 @@ def means(scene: WalkerScene, run: Walked) -> list[Variable]:
 
 
 def fates(scene: WalkerScene, run: Walked) -> list[Variable]:
-    """Return the outcome of a walk, slip and sinkage, and on a slope the distance
-    uphill."""
+    """Return the outcome of a walk, its sinkage, its slip where feet move back in the
+    ground, and on a slope the distance uphill."""
     slip, slip_error = run.slip
     found = [
         Variable("outcome", (), run.outcome(scene), label="what becomes of the robot"),
-        Variable("slip", (), slip, "1", SLIP, slip_error),
         Variable("sinkage", (), run.walk.sinkage, "m", SINKAGE, run.sinkage),
     ]
+    if not math.isnan(slip):
+        found.append(Variable("slip", (), slip, "1", SLIP, slip_error))
     if scene.walker.rise:
         uphill, error = run.uphill(scene)
         found.append(Variable("uphill", (), uphill, "m", UPHILL, error))
