@@ -18,7 +18,11 @@ from geomech.plots.displacement.precision import (
     accuracy_figure,
     work_precision,
 )
-from geomech.plots.displacement.sweeps import curves, sweep_figure
+from geomech.plots.displacement.sweeps import (
+    curves,
+    draw_maps_of_walks,
+    sweep_figure,
+)
 from geomech.plots.figures import (
     ccf_figure,
     connection_figure,
@@ -110,6 +114,7 @@ __all__ = [
     "displacement_figure",
     "drag_figure",
     "draw_gait",
+    "draw_maps_of_walks",
     "draw_stress",
     "drawable",
     "figure",

@@ -200,7 +200,10 @@ def tables(
     count = variables[0].values.shape[-1]
     if rows is not None and is_map(result, variables[0]):
         for variable in variables:
-            yield map_table(result, variable)
+            if variable.is_text:
+                yield counts_table(result, variable)
+            else:
+                yield map_table(result, variable)
         return
     chosen = chosen_rows(count, rows)
     note = ""
@@ -360,6 +363,16 @@ def map_table(result: Result, variable: Variable) -> Table:
     if len(labels) == 2:
         return ranges(result, moved, labels, heading)
     return extremes(result, moved, labels, grid, heading)
+
+
+def counts_table(result: Result, variable: Variable) -> Table:
+    """Return how often each text of a variable occurs over its dimensions, a row a
+    text."""
+    names, counts = np.unique(variable.values, return_counts=True)
+    grid = [dim for dim in variable.dims if not is_label(result, dim)]
+    heading = f"{head(variable)}, over {grid_words(result, grid)}"
+    points = ["points", *map(str, counts)]
+    return Table(heading, [title(variable.name), *map(str, names)], [[points]])
 
 
 def grid_words(result: Result, dims: Sequence[str]) -> str:

@@ -266,7 +266,8 @@ def _with_effect_key(tables: Mapping, parameter: str, value: float) -> list[dict
     if kinds:
         are_meant = [effect.get("kind") == kinds[0] for effect in effects]
     else:
-        are_meant = [key in effect for effect in effects]
+        spellings = {key, _key_in_other_unit(key)}
+        are_meant = [bool(spellings & {*effect}) for effect in effects]
 
     if not any(are_meant):
         if kinds:
@@ -281,7 +282,7 @@ def _with_effect_key(tables: Mapping, parameter: str, value: float) -> list[dict
             instead="use an effect of the scene, or add one",
         )
     return [
-        {**effect, key: value} if is_meant else effect
+        _with_key(effect, key, value) if is_meant else effect
         for effect, is_meant in zip(effects, are_meant)
     ]
 

@@ -17,6 +17,11 @@ from rft.effects.contact import Problem
 from rft.formulas.link import Incline
 from rft.laws.base import is_linear
 from rft.laws.catalogue import REPOSE
+from rft.laws.incline import (
+    assumed_of_incline,
+    incline_factors,
+    require_below_repose,
+)
 
 
 @EFFECTS.register
@@ -25,13 +30,14 @@ class Slope(Effect):
     """A plane surface that rises by an angle, and a body that moves along it at a fixed
     depth.
 
-    The drag is multiplied by cos(angle) - d sin(angle) / tan(repose), where d is the
-    downhill part of the unit velocity of an element's centre, 0 across and uphill. With
-    the default of repose, 37.9 degrees, motion straight downhill at 20 degrees has half
-    the drag of level ground, as measured (paper Sec. IV B). Only one direction at one
-    angle has been measured; assumed are a drag that falls in proportion to d, no gain
-    uphill, and the same factor along and across an element. Weight adds the force
-    weight sin(angle) downhill.
+    The drag is multiplied by cos(angle) - d sin(angle) / tan(repose)
+    (`rft.laws.incline`), where d is the downhill part of the unit velocity of an
+    element's centre, 0 across and uphill. With the default of repose, 37.9 degrees,
+    motion straight downhill at 20 degrees has half the drag of level ground, as
+    measured (paper Sec. IV B). Only one direction at one angle has been measured;
+    assumed are a drag that falls in proportion to d, no gain uphill, and the same
+    factor along and across an element. Weight adds the force weight sin(angle)
+    downhill.
 
     Examples
     --------
@@ -92,15 +98,10 @@ class Slope(Effect):
 
     def __post_init__(self):
         check_numbers(self)
-        angle = math.degrees(self.angle)
-        repose = math.degrees(self.repose)
-        require(
-            self.angle < self.repose,
-            f"a slope of {angle:.3g} degrees slides by itself",
-            because=f"it must be below the angle of repose, {repose:.3g} degrees",
-        )
+        require_below_repose(self.angle, self.repose)
         pull = self.weight * math.sin(self.angle)
-        drag = math.sin(self.repose - self.angle) / math.sin(self.repose)
+        level_factor, downhill_loss = incline_factors(self.angle, self.repose)
+        drag = level_factor - downhill_loss
         require(
             pull < drag,
             "a body of this weight slides down",
@@ -115,18 +116,10 @@ class Slope(Effect):
         )
 
     def assumes(self, medium: Any) -> str:
-        weaker = "weaker ground only where an element moves downhill"
-        if not np.all(self.repose == REPOSE):
-            return weaker
-        return (
-            f"an angle of repose of {math.degrees(REPOSE):.1f} degrees, from half the "
-            f"drag downhill at 20 degrees, and {weaker}"
-        )
+        return assumed_of_incline(self.repose, "an element")
 
     def apply(self, problem: Problem, site: Site, state: Any = None) -> Problem:
-        cos = np.cos(self.angle)
-        sin = np.sin(self.angle)
-
+        level_factor, downhill_loss = incline_factors(self.angle, self.repose)
         uphill = np.exp(1j * np.asarray(self.towards))
 
         def inclined(contact, weight):
@@ -134,13 +127,13 @@ class Slope(Effect):
             incline = Incline(
                 downhill.real,
                 downhill.imag,
-                level_factor=np.atleast_2d(cos),
-                downhill_loss=np.atleast_2d(sin / np.tan(self.repose)),
+                level_factor=np.atleast_2d(level_factor),
+                downhill_loss=np.atleast_2d(downhill_loss),
                 weight=np.atleast_2d(weight),
             )
             return contact._replace(incline=incline)
 
-        weight = self.weight * sin * problem.axial_drag
+        weight = self.weight * np.sin(self.angle) * problem.axial_drag
         return problem._replace(
             sides=inclined(problem.sides, weight), points=inclined(problem.points, 0.0)
         )

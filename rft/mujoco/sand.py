@@ -337,8 +337,9 @@ def attach(
         surface. Each geom sees the plane that touches it below the geom; the ground
         there is as strong as level ground.
     slope : float, rad
-        Angle by which the surface rises along x; the ground is weaker, as in
-        `rft.terradynamics.ground.Slope`.
+        Angle by which the surface rises along x; the ground is weaker downhill, as in
+        `rft.terradynamics.ground.Slope`, which in ``effects`` means the same and may
+        have another angle of repose.
     element : float, m
         Length of the edges of the triangles that geoms are cut into; by default as many
         as the shape of each geom needs
@@ -379,6 +380,7 @@ def attach(
         isinstance(model, mujoco.MjModel), "model must be a mujoco.MjModel", value=model
     )
     require(model.nv > 0, "nothing in the model can move", because="it has no joints")
+    slope, effects = _slope(model, slope, effects)
     hills, field = _height_field(model, level, slope)
     plane_level = 0.0 if field else level
     in_range("level", plane_level, -1e6, 1e6, unit="m")
@@ -397,7 +399,7 @@ def attach(
         isinstance(hulls, bool | np.bool_), "hulls must be True or False", value=hulls
     )
     hulls = bool(hulls)
-    ground = _ground(rounding, slope, effects)
+    ground = _ground(rounding, effects)
 
     own_meshes = meshes(model, chosen, element, hulls)
     surface = Surface.inclined(slope, plane_level, hills)
@@ -445,16 +447,40 @@ def _require_free(model: mujoco.MjModel, geoms: Sequence[int]) -> None:
     )
 
 
-def _ground(
-    rounding: float | None, slope: float, effects: Sequence[GroundEffect]
-) -> Ground:
-    """Return the state of the ground with these effects and, on a slope, that of the
-    slope."""
+def _slope(
+    model: mujoco.MjModel, slope: float, effects: Sequence[GroundEffect]
+) -> tuple[float, tuple[GroundEffect, ...]]:
+    """Return the angle by which the surface rises, rad, given as a number or as an
+    effect, and all effects. Refusal for both, for a mass, which the model has, and for
+    gravity that is tilted already."""
+    effects = checked_effects(effects)
+    slopes = [effect for effect in effects if isinstance(effect, Slope)]
+    g_x, g_y, g_z = model.opt.gravity
+    require(
+        not (slope or slopes) or abs(g_x) + abs(g_y) <= 1e-9 * abs(g_z),
+        "gravity is not along -z",
+        because="a slope inclines the surface under a model whose z is up",
+        instead="set gravity along -z",
+    )
+    if not slopes:
+        return slope, (*effects, Slope(slope)) if slope else effects
+    require(
+        not slope,
+        "the slope is given twice",
+        instead="remove ``slope``, or the effect",
+    )
+    require(
+        not slopes[0].mass,
+        "the bodies of the model have masses of their own",
+        instead="remove ``mass`` of the slope",
+    )
+    return slopes[0].angle, effects
+
+
+def _ground(rounding: float | None, effects: Sequence[GroundEffect]) -> Ground:
+    """Return the state of the ground with these effects."""
     rounding = ROUNDING if rounding is None else rounding
     in_range("rounding", rounding, 1e-7, 10, unit="m/s")
-    effects = checked_effects(effects)
-    if slope:
-        effects = (*effects, Slope(slope))
     return ground_of(effects, Ground(rounding=rounding))
 
 

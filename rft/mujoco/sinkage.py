@@ -26,7 +26,8 @@ def sinkage(
     """Return the depths, m, of `rft.mujoco.sand.Sand.sinkage`; (inf, inf) where the
     grains bear less than the weight at any depth."""
     mass = model.body_subtreemass[np.unique(bed.geoms.roots)].sum()
-    weight = float(mass * np.linalg.norm(model.opt.gravity))
+    # Along the surface the weight does not press.
+    weight = float(-mass * (model.opt.gravity @ bed.surface.up))
     deepest = float(model.stat.extent) + 1e-3
     force = _bearing_force(data, bed)
     if force(deepest) < weight:

@@ -108,6 +108,12 @@ COARSE = {
         "finest": {"steps": 12},
         "frequencies": {},
     },
+    "robots.walking_slopes": {
+        "angles": (0, 5),
+        "frequencies": (2.0, 4.0),
+        "mapped": (0, 20),
+        "fine": {"steps": 12, "elements": 6},
+    },
 }
 
 

@@ -18,7 +18,7 @@ from geomech.questions.terradynamics.walk import Walk
 from geomech.studies.terradynamics import walking
 from rft.balance.backend import preferring
 from rft.core.metres import GRAVITY
-from rft.terradynamics.ground import Aeration, GrainInertia, Slope
+from rft.terradynamics.ground import Aeration, DisturbedGround, GrainInertia
 from rft.terradynamics.plates import VERTICAL, CLeg, RoundRod, StressMap, Wheel, loads
 from rft.terradynamics.walking import (
     Fineness,
@@ -288,9 +288,10 @@ def test_a_wheel_bears_its_load_and_pulls_more_the_more_it_slips():
 
 
 SQUARE = scenes.load("square-rod").intruder
+HOLE = DisturbedGround(places=(0.0,), radius=0.02, weakening=0.4)
 REFUSED = [
     (lambda: rolling(LOOSE, SQUARE, 15.0, 2.0, 0.1), "has no radius"),
-    (lambda: Walker(ROBOT, Tripod(1.0), SAND, (Slope(0.1),)), "not slope"),
+    (lambda: Walker(ROBOT, Tripod(1.0), SAND, (HOLE,)), "not disturbed-ground"),
     (lambda: dataclasses.replace(ROBOT, legs=None), "a robot without legs"),
     (lambda: dataclasses.replace(ROBOT, hips=(HIPS,)), "hips must be a list of x"),
     (lambda: dataclasses.replace(XPLORER, numerics=3), "numerics must be Fineness"),

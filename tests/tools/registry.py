@@ -13,7 +13,7 @@ from rft.bodies import BODIES as kinds_of_bodies
 from rft.effects import EFFECTS as kinds_of_effects
 from rft.laws import CATALOGUE, LAWS, is_closed
 from rft.terradynamics.ground import GROUND_EFFECTS as kinds_of_ground_effects
-from rft.terradynamics.ground import Aeration
+from rft.terradynamics.ground import Aeration, Slope
 from rft.terradynamics.ground import GrainInertia as GrainPressure
 from rft.terradynamics.meshes import Cylinder, Leg, Screw, Sphere
 from rft.terradynamics.plates import (
@@ -105,6 +105,7 @@ WALKERS = {
     "rhex, air and grain inertia": Walker(
         UNEVEN, Tripod(3.0), POPPY, (Aeration(0.1, 0.4), GrainPressure(2.0))
     ),
+    "rhex, on a slope": Walker(UNEVEN, Tripod(2.0), POPPY, (Slope(0.1, 0.6),)),
     "wheel, lugs": Walker(
         Roller(2.0, Wheel(0.1, 0.1, 12, 0.015, 0.006)), Tripod(1.0, 0.3, 1.0), POPPY
     ),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,11 +12,13 @@ from geomech.mathematics.systems.base import body_size, length_unit
 from geomech.plots.displacement.displacements import draw_measurements, medium_band
 from geomech.plots.look import colours
 from geomech.plots.style import MARKED, figure, quantity, styled
+from geomech.results.scenes import scene_of
 from geomech.scenes.data.measurements import METRES, swept_points
 from geomech.scenes.model import Scene
 from geomech.studies.displacement.cycles import AMPLITUDE
 from geomech.studies.displacement.variables import position_spread
 from geomech.studies.mechanics.outcome import CLIMBS, ROLLS, SLIDES, SLIPS
+from geomech.studies.terradynamics import outcome as robots
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
@@ -53,7 +55,20 @@ PARAMETER_UNITS = {
 TORQUE_UNITS = {"stiffness": "N m/rad", "damping": "N m s/rad"}
 
 MARK = "#b5179e"  # colour of outcomes
-OUTCOME_MARKS = {SLIPS: "v", SLIDES: "x", ROLLS: "o"}
+OUTCOME_MARKS = {
+    SLIPS: "v",
+    SLIDES: "x",
+    ROLLS: "o",
+    robots.STAYS: "s",
+    robots.TURNS: "<",
+    robots.TIPS: "^",
+    robots.SINKS: "1",
+    robots.FLIES: "*",
+    robots.UNDECIDED: "$?$",
+}
+# In maps of robots; bodies that do what they should have no mark in other pictures.
+GOOD_MARKS = {robots.WALKS: ".", CLIMBS: "+", robots.DESCENDS: "|"}
+MAPPED = {"speed": "mean speed", "slip": "slip", "sinkage": "sinkage"}
 ESTIMATED = "with estimated error"  # label of a curve
 
 ROBOT_UNITS = {  # likewise, in scenes of robots
@@ -81,15 +96,22 @@ ROBOT_UNITS = {  # likewise, in scenes of robots
     "nose": "m",
     "track": "m",
     "drop": "m",
+    "angle": "rad",
+    "repose": "rad",
     "xi_n": "N/m$^3$",
     "density": "kg/m$^3$",
 }
 
 
 @styled
-def sweep_figure(scene: Any, result: Result, data: Any = None) -> Figure:
+def sweep_figure(
+    scene: Any, result: Result, data: Any = None, maps: bool = False
+) -> Figure:
     """Draw a sweep over one parameter or two: net distance or speed, or the speed of a
     robot; refuse more parameters.
+
+    maps: draw speed, slip and sinkage of a robot over two parameters as maps, with the
+    outcomes marked, in place of curves.
 
     data: measurements to draw as points over a single parameter: the name of a file, or
     a table, with a column of the parameter, "value" and, if known, "error".
@@ -111,9 +133,27 @@ def sweep_figure(scene: Any, result: Result, data: Any = None) -> Figure:
             "measured points are drawn over one parameter",
             instead="sweep one parameter, or leave ``data`` out",
         )
+    if maps:
+        check_maps(count, "status" in result)
+        return _maps_of_walks(result)
     if "status" in result:
         return _speed_figure(scene, result, data)
     return _net_figure(scene, result, data)
+
+
+def check_maps(count: int, is_walk: bool) -> None:
+    """Raise Refusal for maps of other sweeps than those of robots over two of their
+    parameters. count: of the parameters. is_walk: whether a robot walks."""
+    if not is_walk:
+        raise Refusal(
+            "maps are of robots that walk",
+            instead="leave ``maps`` out: sweeps over two parameters are maps already",
+        )
+    if count != 2:
+        raise Refusal(
+            f"cannot draw maps over {count} parameters",
+            instead="sweep two parameters, or leave ``maps`` out",
+        )
 
 
 def measured_units(scene: Any, quantity: str, unit: str) -> dict[str, dict[str, float]]:
@@ -215,12 +255,28 @@ def _uphill_values(uphill: Variable) -> tuple:
 
 
 def _mark_outcomes(
-    ax: Axes, result: Result, order: Any, rising: list[np.ndarray]
+    ax: Axes,
+    result: Result,
+    order: Any,
+    rising: list[np.ndarray],
 ) -> None:
-    """Mark the points of a sweep of scenes on a slope at which a body does not climb,
-    with a legend."""
+    """Mark the points of a sweep whose outcomes have marks, by default all but those of
+    a body that climbs or walks, with a legend if there are any."""
+    _scatter_outcomes(ax, result, order, rising, OUTCOME_MARKS)
+    if ax.get_legend_handles_labels()[1]:
+        ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+
+
+def _scatter_outcomes(
+    ax: Axes,
+    result: Result,
+    order: Any,
+    rising: list[np.ndarray],
+    marks: Mapping[str, str],
+) -> None:
+    """Mark the points of a sweep whose outcomes have marks."""
     outcomes = result["outcome"].values[order]
-    for name, marker in OUTCOME_MARKS.items():
+    for name, marker in marks.items():
         where = np.nonzero(outcomes == name)
         if not len(where[0]):
             continue
@@ -232,8 +288,6 @@ def _mark_outcomes(
         else:
             y = rising[1][where[1]]
             ax.scatter(x, y, marker=marker, color=MARK, **look)
-    if (outcomes != CLIMBS).any():
-        ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
 
 
 @styled
@@ -336,7 +390,52 @@ def _speed_figure(scene: Any, result: Result, data: Any) -> Figure:
     if data is not None:
         units = measured_units(scene, "speed", unit.removesuffix("/s"))
         _draw_points(ax, data, *over, units)
+    elif len(over) == 1 and "outcome" in result:
+        order = np.argsort(values[0], kind="stable")
+        _mark_outcomes(ax, result, order, [np.sort(values[0])])
     return fig
+
+
+@styled
+def _maps_of_walks(result: Result) -> Figure:
+    """Draw speed, slip and sinkage over two parameters, with the outcomes marked and
+    named."""
+    fig, axes = figure(9.6, 3.4, len(MAPPED))
+    handles, names = draw_maps_of_walks(list(axes.ravel()), result)
+    fig.legend(handles, names, loc="outside upper center", ncols=6)
+    return fig
+
+
+@styled
+def draw_maps_of_walks(
+    axes: list[Axes], result: Result, names: Sequence[str] = tuple(MAPPED)
+) -> tuple[list, list[str]]:
+    """Draw maps of a sweep of a robot over two parameters, one on each of some axes;
+    return handles and names of the outcomes for a legend.
+
+    names: what to draw, of speed, slip and sinkage.
+
+    Examples
+    --------
+    >>> import geomech
+    >>> over = {"effects.slope.angle_deg": [0.0, 10.0], "gait.frequency": [1.0, 2.0]}
+    >>> swept = geomech.sweep("xplorer-slope", over)
+    >>> fig, axes = geomech.plots.figure(4.0, 3.0)
+    >>> handles, names = geomech.plots.draw_maps_of_walks(axes[0], swept, ["slip"])
+    >>> names
+    ['walks', 'climbs']
+    """
+    over = parameters(result)
+    order = np.ix_(*(np.argsort(x, kind="stable") for x in over.values()))
+    rising = [np.sort(x) for x in over.values()]
+    labels = axis_labels(scene_of(result), list(over), ROBOT_UNITS)
+    for ax, name in zip(axes, names):
+        variable = result[name]
+        unit = variable.unit if variable.unit != "1" else "-"
+        _draw_map(ax, *rising, variable.values[order], quantity(MAPPED[name], unit))
+        ax.set(xlabel=labels[0], ylabel=labels[1])
+        _scatter_outcomes(ax, result, order, rising, GOOD_MARKS | OUTCOME_MARKS)
+    return axes[0].get_legend_handles_labels()
 
 
 def curves(ax: Axes, values: Any, result: Result, names: Any) -> None:

@@ -22,6 +22,7 @@ TRIPOD_COLOURS = ("0.2", "C0")  # of the legs that move in step
 STRIP_PICTURES = 6
 MEASURED_ROWS = 60  # of a film, at which the extent of a robot is taken
 NARROWEST_PICTURE = 1.6  # in
+ARROW = 24.0  # points, length of the arrow of gravity
 FOLLOWED_SPAN = 2.4  # in half widths of a robot, to either side of one that is followed
 
 
@@ -112,6 +113,7 @@ def walk_stage(
         xlabel=f"$x$ ({result['x'].unit})",
         ylabel=f"$z$ ({result['z'].unit})",
     )
+    draw_gravity(ax, scene_of(result).walker.rise)
     draw_robot = robot.artist(ax)
     title = ax.set_title("", loc="left", fontsize=font_points(8))
 
@@ -122,6 +124,25 @@ def walk_stage(
             ax.set_xlim(x[row] - margin, x[row] + margin)
 
     return update
+
+
+def draw_gravity(ax: Axes, rise: float) -> None:
+    """Draw the direction of gravity, on ground that rises along x by an angle, rad, and
+    is drawn level; nothing on level ground."""
+    if rise == 0.0:
+        return
+    direction = np.array([-np.sin(rise), -np.cos(rise)])
+    ax.annotate(
+        "$g$",
+        xy=(0.94, 0.72),
+        xycoords="axes fraction",
+        xytext=-ARROW * direction,
+        textcoords="offset points",
+        ha="center",
+        va="center",
+        fontsize=font_points(8),
+        arrowprops={"arrowstyle": "->", "lw": 0.8},
+    )
 
 
 def robot_limits(

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from geomech.scenes.model import Scene
     from geomech.studies.displacement.sweep import Plan
 
-SHOWN = ("net_distance", "speed", "uphill", "status")
+SHOWN = ("net_distance", "speed", "uphill", "slip", "sinkage", "status", "outcome")
 LARGEST_DRAWN = 2  # parameters of a figure
 
 
@@ -65,7 +65,11 @@ class Sweep(Question):
             check_best(self.scene, self.over, self.best)
         _ = self.plan.grid  # refuses points that make no scene
 
-    def check_draw(self, data: Any = None) -> None:
+    def check_draw(self, data: Any = None, maps: bool = False) -> None:
+        if maps:
+            from geomech.plots.displacement.sweeps import check_maps
+
+            check_maps(len(self.over), hasattr(self.scene, "robot"))
         if len(self.over) > LARGEST_DRAWN:
             raise Refusal(
                 f"cannot draw {len(self.over)} parameters",
@@ -138,7 +142,8 @@ class Sweep(Question):
         outcomes = result["outcome"].values.ravel().tolist()
         names = dict.fromkeys(outcomes)
         counts = [f"{name} at {outcomes.count(name)}" for name in names]
-        return [f"on the slope it {', '.join(counts)} of {len(outcomes)} points"]
+        where = "on the slope it" if "uphill" in result else "it"
+        return [f"{where} {', '.join(counts)} of {len(outcomes)} points"]
 
     @staticmethod
     def summary(result: Result) -> Result:
@@ -155,9 +160,13 @@ class Sweep(Question):
                 "points to draw over a single KEY, such as C,value,error", "FILE.csv"
             ),
         ] = None,
+        maps: Annotated[
+            bool,
+            Option("draw maps of a robot's speed, slip and sinkage over two KEYs"),
+        ] = False,
     ) -> Any:
         """Draw curves over one parameter, or maps over two; return the Figure."""
         from geomech import plots
         from geomech.results.scenes import scene_of
 
-        return plots.sweep_figure(scene_of(result), result, data)
+        return plots.sweep_figure(scene_of(result), result, data, maps)

@@ -91,7 +91,9 @@ class Walk(Question):
 
     @staticmethod
     def summary(result: Result) -> Result:
-        shown = ["total_work", "total_loss", "cost_of_transport"]
+        shown = ["slip", "sinkage", "total_work", "total_loss", "cost_of_transport"]
+        if "uphill" in result:
+            shown = ["uphill", *shown]
         if str(result["status"].values) != WALKING:
             shown.remove("cost_of_transport")
         if "yaw" in result:
@@ -105,6 +107,7 @@ class Walk(Question):
         share = 100 * float(result["unaccounted"])
         unit = result["speed"].unit
         lines = [
+            outcome_words(result),
             motion_words(result),
             f"of the error, {steps:.1g} {unit} come from the steps and {elements:.1g} "
             f"{unit} from the elements",
@@ -152,6 +155,14 @@ def settling_words(result: Result) -> str:
     if time == 0:
         return f"; {within} from the start"
     return f"; starting from rest it is {within} after {time:.2g} s"
+
+
+def outcome_words(result: Result) -> str:
+    """Return the outcome of a walk with its definition."""
+    from geomech.studies.terradynamics.outcome import OUTCOMES
+
+    name = str(result["outcome"].values)
+    return f"{name}: {OUTCOMES[name]}"
 
 
 def motion_words(result: Result) -> str:

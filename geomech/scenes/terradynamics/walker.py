@@ -25,10 +25,8 @@ from rft.terradynamics.walking import (
 )
 
 ATTACH = "use rft.mujoco.attach(model, medium, {} = ...) in your own loop"
-ELSEWHERE = {
-    "slope": ATTACH.format("slope"),
-    "disturbed-ground": ATTACH.format("footprints"),
-}
+ELSEWHERE = {"disturbed-ground": ATTACH.format("footprints")}
+SLOPE = 'add [[effects]] with kind = "slope" and its angle'
 KINDS = {kind: effect for kind, effect in GROUND_EFFECTS.items() if effect.walks}
 LAWS = {"planar": StressKeys, "3d": SpatialKeys}
 # Keys that only a [medium] of three dimensions has.
@@ -107,7 +105,7 @@ class WalkerScene:
 def with_implied_names(tables: Mapping, name: str) -> dict:
     """Return the tables of a scene with the names that they omit: the kinds of the
     robot and its screw, and the law."""
-    _refuse_slope(tables, name)
+    _refuse_slope_as_key(tables, name)
     tables = {
         key: dict(table) if isinstance(table, Mapping) else table
         for key, table in tables.items()
@@ -132,8 +130,8 @@ def with_implied_names(tables: Mapping, name: str) -> dict:
     return tables
 
 
-def _refuse_slope(tables: Mapping, name: str) -> None:
-    """Raise Refusal for a slope of the ground, in any section or above all of them."""
+def _refuse_slope_as_key(tables: Mapping, name: str) -> None:
+    """Raise Refusal for a key that is a slope, in any section or above all of them."""
     for section, table in tables.items():
         keys = {section}
         place = "slope"
@@ -144,6 +142,6 @@ def _refuse_slope(tables: Mapping, name: str) -> None:
             raise Refusal(
                 place,
                 where=name,
-                because="a walking scene must have level ground",
-                instead=ELSEWHERE["slope"],
+                because="the slope of walking scenes is an effect",
+                instead=SLOPE,
             )

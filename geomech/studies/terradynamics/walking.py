@@ -22,6 +22,7 @@ from geomech.scenes import write as written
 from geomech.scenes.terradynamics.walker import WalkerScene
 from geomech.studies.grid import Grid
 from geomech.studies.settings import Measurements
+from geomech.studies.terradynamics.outcome import OUTCOMES, outcome
 from rft.core.metres import GRAVITY
 from rft.core.refusal import Refusal, located
 from rft.terradynamics.walking import Mjcf, Rhex, Roller, Walk, engine
@@ -64,6 +65,9 @@ LABELS = {
     "yaw": "to the left",
 }
 LIMIT = 3  # cycles up to the limit cycle, and as many for each of its errors
+SLIP = "1 - distance / distance by which the feet move back in the ground"
+SINKAGE = "largest depth of the legs in the ground"
+UPHILL = "distance uphill along the slope per cycle"
 SETTINGS = (
     Setting("steps", (12, 16, 24, 32, 48, 64, 96), 2, against="limit"),
     Setting("elements", (6, 8, 12, 16, 24, 32), 2, against="limit"),
@@ -85,7 +89,9 @@ class Walked(NamedTuple):
     `rft.terradynamics.walking.engines.Variation`; the distance from the limit cycle;
     and the effect of unsolved steps. lateral, turning: errors of the lateral speed,
     m/s, and of the yaw rate, rad/s, by the changes alone. steps, elements: m/s, the
-    parts of the estimate that come from each."""
+    parts of the estimate that come from each. along: as the estimate, m/s, of the
+    velocity along x. feet, sinkage: errors of the feet's speed, m/s, and of the
+    sinkage, m, by the changes alone."""
 
     walk: Walk
     estimate: float
@@ -93,6 +99,35 @@ class Walked(NamedTuple):
     turning: float = 0.0
     steps: float = 0.0
     elements: float = 0.0
+    along: float = 0.0
+    feet: float = 0.0
+    sinkage: float = 0.0
+
+    @property
+    def slip(self) -> tuple[float, float]:
+        """1 - distance / distance of the feet's motion, and its error; nan where no
+        foot moves back in the ground."""
+        foot_speed = self.walk.foot_speed
+        if not foot_speed > 0.0:
+            return math.nan, math.nan
+        ratio = self.walk.speed / foot_speed
+        error = (self.estimate + abs(ratio) * self.feet) / foot_speed
+        return 1.0 - ratio, error
+
+    def outcome(self, scene: WalkerScene) -> str:
+        """Return the outcome of the walk of a scene
+        (`geomech.studies.terradynamics.outcome`)."""
+        rise = scene.walker.rise
+        return outcome(self.walk, self.along, scene.gait.frequency, rise)
+
+    def uphill(self, scene: WalkerScene) -> tuple[float, float]:
+        """Return the distance uphill per cycle of the walk of a scene, m, and its
+        error; nan on level ground."""
+        rise = scene.walker.rise
+        f = scene.gait.frequency
+        if rise == 0.0:
+            return math.nan, math.nan
+        return math.copysign(1.0, rise) * self.walk.speed_along / f, self.along / f
 
 
 def walked(
@@ -132,19 +167,29 @@ def walked(
     steps = np.max(changes["steps"], axis=0)
     elements = np.max(changes["elements"], axis=0)
     errors = steps + elements
-    errors[:, 0] += [walk.drift + walk.unsolved_error for walk in walks]
+    of_cycles = np.array([walk.drift + walk.unsolved_error for walk in walks])
+    errors[:, [0, 3]] += of_cycles[:, None]
     found = []
     for k, walk in enumerate(walks):
-        estimate, lateral, turning = errors[k].tolist()
+        estimate, lateral, turning, along, feet, sinkage = errors[k].tolist()
         of_steps = float(steps[k, 0])
         of_elements = float(elements[k, 0])
-        found.append(Walked(walk, estimate, lateral, turning, of_steps, of_elements))
+        parts = of_steps, of_elements, along, feet, sinkage
+        found.append(Walked(walk, estimate, lateral, turning, *parts))
     return found
 
 
-def _means(walk: Walk) -> tuple[float, float, float]:
-    """Return the means of a walk that have an error: speed, lateral speed, yaw rate."""
-    return walk.speed, walk.lateral_speed, walk.yaw_rate
+def _means(walk: Walk) -> tuple[float, ...]:
+    """Return the means of a walk that have an error: speed, lateral speed, yaw rate,
+    velocity along x, speed of the feet, and sinkage."""
+    return (
+        walk.speed,
+        walk.lateral_speed,
+        walk.yaw_rate,
+        walk.speed_along,
+        walk.foot_speed,
+        walk.sinkage,
+    )
 
 
 def cost_of_transport(scene: WalkerScene, walk: Walk) -> float:
@@ -226,10 +271,27 @@ def means(scene: WalkerScene, run: Walked) -> list[Variable]:
         ("yaw_rate", walk.yaw_rate, "rad/s", run.turning),
     ):
         found.append(Variable(name, (), value, unit, to_the_left, error, zero=zero))
+    found += fates(scene, run)
     if not math.isnan(walk.settling_time):
         share = f"{100 * NEAR:g} %"
         label = f"time from rest until within {share} of the limit cycle, inf for never"
         found.append(Variable("settling_time", (), walk.settling_time, "s", label))
+    return found
+
+
+def fates(scene: WalkerScene, run: Walked) -> list[Variable]:
+    """Return the outcome of a walk, its sinkage, its slip where feet move back in the
+    ground, and on a slope the distance uphill."""
+    slip, slip_error = run.slip
+    found = [
+        Variable("outcome", (), run.outcome(scene), label="what becomes of the robot"),
+        Variable("sinkage", (), run.walk.sinkage, "m", SINKAGE, run.sinkage),
+    ]
+    if not math.isnan(slip):
+        found.append(Variable("slip", (), slip, "1", SLIP, slip_error))
+    if scene.walker.rise:
+        uphill, error = run.uphill(scene)
+        found.append(Variable("uphill", (), uphill, "m", UPHILL, error))
     return found
 
 
@@ -339,7 +401,7 @@ def _accelerating_cycles(scene: WalkerScene) -> float:
 
 @dataclass(frozen=True)
 class Walks:
-    """Speed of robots, as a question of sweeps."""
+    """Speed, slip, sinkage and outcome of robots, as a question of sweeps."""
 
     def grid(self, scene: WalkerScene, over: Mapping[str, list[float]]) -> Grid:
         """Return the grid; Refusal if one of some 200 of its points does not yield a
@@ -358,14 +420,19 @@ class Walks:
         return BATCH if scene.engine == "planar" else 1
 
     def rows(self, scenes: list[WalkerScene], inner_values: None) -> np.ndarray:
-        """Return speed, its error, status and cycles of each scene (n, 4)."""
+        """Return speed, its error, status and cycles of each scene, slip, sinkage and
+        distance uphill with their errors, and outcome, (n, 11)."""
         rows = []
         groups = itertools.groupby(scenes, key=lambda s: (s.numerics, s.engine))
         for _, group in groups:
-            for one in walked(list(group), settling=True):
+            members = list(group)
+            for scene, one in zip(members, walked(members, settling=True)):
                 walk = one.walk
                 status = STATUSES.index(walk.status)
-                rows.append([walk.speed, one.estimate, status, walk.cycles])
+                row = [walk.speed, one.estimate, status, walk.cycles]
+                row += [*one.slip, walk.sinkage, one.sinkage, *one.uphill(scene)]
+                row.append([*OUTCOMES].index(one.outcome(scene)))
+                rows.append(row)
         return np.array(rows)
 
     def cost(self, grid: Grid) -> WalkCost:
@@ -379,12 +446,21 @@ class Walks:
     def variables(
         self, grid: Grid, rows: np.ndarray, dims: tuple[str, ...]
     ) -> tuple[list[Variable], dict]:
-        speed, estimate, kinds, cycles = np.moveaxis(rows, -1, 0)
+        speed, estimate, kinds, cycles, *others = np.moveaxis(rows, -1, 0)
+        slip, slip_error, sinkage, sinkage_error, uphill, uphill_error, fates = others
+        names = np.array([*OUTCOMES])[fates.astype(int)]
         variables = [
             Variable("speed", dims, speed, "m/s", "mean speed", estimate),
             Variable("status", dims, np.array(STATUSES)[kinds.astype(int)]),
             Variable("cycles", dims, cycles, "1"),
+            Variable("slip", dims, slip, "1", SLIP, slip_error),
+            Variable("sinkage", dims, sinkage, "m", SINKAGE, sinkage_error),
+            Variable("outcome", dims, names, "", "outcome"),
         ]
+        if not np.isnan(uphill).all():
+            variables.append(
+                Variable("uphill", dims, uphill, "m", UPHILL, uphill_error)
+            )
         return variables, {}
 
 

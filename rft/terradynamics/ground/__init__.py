@@ -13,6 +13,7 @@ from rft.terradynamics.ground.base import (
     checked_effects,
     ground_of,
     inverse_speed,
+    rise_of,
     strength_at,
     weight,
 )
@@ -33,6 +34,7 @@ __all__ = [
     "checked_effects",
     "ground_of",
     "inverse_speed",
+    "rise_of",
     "strength_at",
     "weight",
 ]

@@ -136,6 +136,11 @@ class GroundEffect:
         """Assumptions of the effect beyond what the scene states; empty by default."""
         return ""
 
+    @property
+    def rise(self) -> float:
+        """Angle by which the effect lets the surface rise along x, rad."""
+        return 0.0
+
 
 GROUND_EFFECTS = Registry(
     "geomech.ground_effects",
@@ -160,6 +165,18 @@ def ground_of(effects: Sequence[GroundEffect], ground: Ground | None = None) -> 
     for effect in checked_effects(effects):
         ground = effect.apply(ground)
     return ground
+
+
+def rise_of(effects: Sequence[GroundEffect]) -> float:
+    """Return the angle by which the surface rises along x with all effects, rad.
+
+    Examples
+    --------
+    >>> from rft.terradynamics.ground import Aeration, Slope, rise_of
+    >>> rise_of([Slope(angle=0.2), Aeration(0.1, 0.25)])
+    0.2
+    """
+    return sum(effect.rise for effect in effects)
 
 
 def weight(effects: Sequence[GroundEffect]) -> np.ndarray:

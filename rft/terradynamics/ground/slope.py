@@ -8,9 +8,13 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from rft.core.checks import Number, check_numbers
-from rft.core.metres import GRAVITY
-from rft.core.refusal import require
 from rft.laws.catalogue import REPOSE
+from rft.laws.incline import (
+    assumed_of_incline,
+    gravity_on_incline,
+    incline_factors,
+    require_below_repose,
+)
 from rft.terradynamics.ground.base import GROUND_EFFECTS, Ground, GroundEffect
 
 
@@ -22,15 +26,13 @@ class Slope(GroundEffect):
     With the default angle of repose, 37.9 degrees, a plate that moves straight downhill
     on a slope of 20 degrees has half its drag on level ground, as measured (paper Sec.
     IV B). With 30 degrees, the angle of many heaps, it would have a third. Gravity adds
-    the force -mass g sin(angle) along the slope at the body's origin. Powers are those
-    of the grains alone.
+    the force -mass g sin(angle) along the slope at the origin of an intruder. Powers
+    are those of the grains alone. Robots that walk have a mass of their own, and
+    gravity acts on all of it along the slope and along its normal.
 
-    The strength is cos(angle) - d sin|angle| / tan(repose) times that of level ground.
-    Here d, 0 to 1, is the downhill component of the face's unit velocity, 0 for a face
-    that moves straight in, across or uphill. Straight downhill the factor is
-    sin(repose - |angle|) / sin(repose): grains |z| deep can take a shear of
-    rho g |z| cos(angle) tan(repose), of which their own weight along the slope takes
-    rho g |z| sin|angle|.
+    The strength is cos(angle) - d sin|angle| / tan(repose) times that of level ground
+    (`rft.laws.incline`). Here d, 0 to 1, is the downhill component of the face's unit
+    velocity, 0 for a face that moves straight in, across or uphill.
 
     One direction at one angle has been measured. Assumed are a strength that falls in
     proportion to d, no gain uphill, and one factor for forces along and across a face.
@@ -65,41 +67,38 @@ class Slope(GroundEffect):
             "the slope",
         ),
     ] = REPOSE
-    mass: Annotated[float, Number(0, 1e6, "kg", "mass of the body")] = 0.0
+    mass: Annotated[
+        float, Number(0, 1e6, "kg", "mass of an intruder; robots have their own")
+    ] = 0.0
 
     kind = "slope"
     limit = "angle = 0"
     cost = "one multiplication per element"
+    walks = True
 
     def __post_init__(self):
         check_numbers(self)
-        angle = math.degrees(self.angle)
-        repose = math.degrees(self.repose)
-        require(
-            abs(self.angle) < self.repose,
-            f"a slope of {angle:.3g} degrees slides by itself: "
-            f"it must be below the angle of repose, {repose:.3g} degrees",
-        )
+        require_below_repose(self.angle, self.repose)
 
     def apply(self, ground: Ground) -> Ground:
-        loss = -math.tan(self.angle) / math.tan(self.repose)
+        level_factor, downhill_loss = incline_factors(self.angle, self.repose)
+        share = float(downhill_loss / level_factor)
         return ground._replace(
-            strength=ground.strength * math.cos(self.angle), downhill_loss=loss
+            strength=ground.strength * float(level_factor),
+            downhill_loss=-math.copysign(share, self.angle),
         )
 
     def weight(self) -> tuple[float, float]:
-        return -self.mass * GRAVITY * math.sin(self.angle), 0.0
+        along, _ = gravity_on_incline(self.angle)
+        return self.mass * along, 0.0
+
+    @property
+    def rise(self) -> float:
+        return self.angle
 
     @property
     def assumes(self) -> str:
-        downhill_only = "weaker ground only where a face moves downhill"
-        if self.repose != REPOSE:
-            return downhill_only
-        repose = math.degrees(REPOSE)
-        return (
-            f"an angle of repose of {repose:.1f} degrees, from half the drag downhill "
-            f"at 20 degrees, and {downhill_only}"
-        )
+        return assumed_of_incline(self.repose, "a face")
 
     @classmethod
     def examples(cls, x: float = 0.3) -> dict[str, Slope]:

@@ -10,7 +10,14 @@ from typing import Annotated, NamedTuple, Protocol
 
 from rft.core.checks import Number, check_numbers
 from rft.core.refusal import Refusal, formatted, require
-from rft.terradynamics.ground import Ground, GroundEffect, checked_effects, ground_of
+from rft.terradynamics.ground import (
+    GROUND_EFFECTS,
+    Ground,
+    GroundEffect,
+    checked_effects,
+    ground_of,
+    rise_of,
+)
 from rft.terradynamics.meshes.forces.law import Spatial
 from rft.terradynamics.plates.stress import PlateStress
 from rft.terradynamics.walking.planar.stride import Walk, compute_stride
@@ -20,7 +27,8 @@ from rft.terradynamics.walking.robot import SMALLEST_ROUNDING, Robot, Tripod
 @dataclass(frozen=True)
 class Walker:
     """A robot, its clock and its ground. stress: a stress map of the vertical plane, or
-    a law of three dimensions. effects: aeration and grain inertia.
+    a law of three dimensions. effects: on the ground, those on which robots walk.
+    On a slope x is along the surface and z along its normal.
 
     Examples
     --------
@@ -48,17 +56,27 @@ class Walker:
             require(isinstance(value, kind), f"{name} must be a {spoken}", value=value)
         object.__setattr__(self, "effects", checked_effects(self.effects))
         for effect in self.effects:
+            kinds = sorted(k for k, kind in GROUND_EFFECTS.items() if kind.walks)
             require(
                 effect.walks,
-                "walking supports the effects aeration and grain-inertia, not "
-                f"{effect.kind}",
+                f"walking supports the effects {', '.join(kinds)}, not {effect.kind}",
                 instead="remove it",
+            )
+            require(
+                not getattr(effect, "mass", 0.0),
+                f"a robot has a mass of its own, {effect.kind} needs none",
+                instead=f"remove ``mass`` of {effect.kind}",
             )
 
     @property
     def ground(self) -> Ground:
         """Ground with all effects."""
         return ground_of(self.effects)
+
+    @property
+    def rise(self) -> float:
+        """Angle by which the surface rises ahead of the robot, rad."""
+        return rise_of(self.effects)
 
 
 @dataclass(frozen=True)

@@ -24,12 +24,14 @@ import numpy as np
 from rft.motion import limit_cycle
 from rft.terradynamics.meshes.forces.extruded import Extruded
 from rft.terradynamics.meshes.forces.law import Spatial
+from rft.terradynamics.walking.craft import Screws
 from rft.terradynamics.walking.engines import (
     Fineness,
     Variation,
     Walker,
     with_more_elements,
 )
+from rft.terradynamics.walking.feet import Feet, at_both_ends, feet_of
 from rft.terradynamics.walking.planar.stride import (
     AVERAGED_CYCLES,
     MOST_STRIDES,
@@ -218,6 +220,7 @@ class Simulation:
         law = _spatial_law(walker)
         self.machine = build_machine(walker.robot, numerics.elements, planar, PIECES)
         self.gait = walker.gait
+        self.is_level = walker.rise == 0.0
         # Legs and screws of hardly any mass turn as the clock does, also where its rate
         # jumps.
         self.is_prescribed = not isinstance(walker.robot, Mjcf)
@@ -239,9 +242,16 @@ class Simulation:
         self.body = Multibody(
             self.machine.model,
             self.machine.surfaces,
-            Grains(law, ground.strength, ground.flux, float(rounding)),
+            Grains(
+                law,
+                ground.strength,
+                ground.flux,
+                float(rounding),
+                ground.downhill_loss,
+            ),
             self.clock,
             _substeps(walker, self.machine.model),
+            walker.rise,
         )
         self.clock.set_start(self.body)
         self.intervals = intervals(self.clock.kinks(), numerics.steps)
@@ -295,6 +305,12 @@ class Simulation:
         from_rest = start is None
         if record.is_periodic and from_rest and status == "walking":
             settling_time = record.settling_time()
+        late_rows, late_positions = record.late()
+        feet = self.feet(late_rows, late_positions)
+        if record.status:
+            late_rows = np.array(record.rows)
+        along = self.speed_along(late_rows)
+        turned = float(np.diff(np.unwrap(np.array(record.rows)[:, YAW])[[0, -1]])[0])
         rows, positions = record.until(duration)
         columns = dict(zip(ROW, rows.T))
         return Walk(
@@ -322,6 +338,11 @@ class Simulation:
             settling_time=settling_time,
             lateral_speed=lateral_speed,
             yaw_rate=yaw_rate,
+            speed_along=along,
+            turned=turned,
+            foot_speed=feet.speed,
+            sinkage=feet.sinkage,
+            reach=self.reach,
         )
 
     def means(
@@ -349,6 +370,44 @@ class Simulation:
         status = "stuck" if is_stuck else "walking"
         f = self.gait.frequency
         return (late.mean(0) * f).tolist(), float(drift * f), status
+
+    def speed_along(self, rows: np.ndarray) -> float:
+        """Return the mean velocity along x over rows, m/s."""
+        duration = rows[-1, T] - rows[0, T]
+        if not duration > 0.0:
+            return 0.0
+        return float((rows[-1, X] - rows[0, X]) / duration)
+
+    def feet(self, rows: np.ndarray, positions: np.ndarray) -> Feet:
+        """Return the feet over rows and positions of steps; of a robot without legs the
+        speed is nan."""
+        data = mujoco.MjData(self.body.model)
+        facets = self.body.facets
+        legs = facets.bodies != self.machine.root
+        is_leg = legs[facets.owner]
+        if not legs.any():
+            is_leg[:] = True
+        corners = facets.corners[is_leg].reshape(-1, 3)
+        bodies = np.repeat(facets.bodies[facets.owner[is_leg]], 3)
+        ahead = []
+        height = []
+        for row, qpos in zip(rows, positions):
+            data.qpos[:] = qpos
+            mujoco.mj_kinematics(self.body.model, data)
+            turn = data.xmat.reshape(-1, 3, 3)[bodies]
+            place = np.einsum("pij,pj->pi", turn, corners) + data.xpos[bodies]
+            away = place - data.xpos[self.machine.root]
+            ahead.append(away[:, 0] * np.cos(row[YAW]) + away[:, 1] * np.sin(row[YAW]))
+            height.append(place[:, 2])
+        feet = feet_of(
+            at_both_ends(np.array(ahead)),
+            at_both_ends(np.array(height)),
+            float(rows[-1, T] - rows[0, T]),
+        )
+        # The points of a screw move to the side.
+        if not legs.any() or isinstance(self.arguments[0].robot, Screws):
+            return feet._replace(speed=np.nan)
+        return feet
 
     def stride(self, stride: int, rows: list, positions: list) -> str:
         """Compute a stride, append its rows and positions, and return `end_status`
@@ -445,6 +504,8 @@ class Simulation:
         data = self.body.data
         rotation = data.xmat[self.machine.root].reshape(3, 3)
         yaw = np.arctan2(rotation[1, 0], rotation[0, 0])
+        cos = np.cos(yaw)
+        sin = np.sin(yaw)
         leg_speed = 2 * np.pi * self.gait.frequency * self.reach
         velocities = data.qvel * self.body.size / leg_speed
         positions = []
@@ -455,14 +516,16 @@ class Simulation:
                 positions.append(data.qpos[address + 2] / self.reach)
                 first = model.jnt_dofadr[joint]
                 v_x, v_y = velocities[first : first + 2]
-                velocities[first] = v_x * np.cos(yaw) + v_y * np.sin(yaw)
-                velocities[first + 1] = v_y * np.cos(yaw) - v_x * np.sin(yaw)
+                velocities[first] = v_x * cos + v_y * sin
+                velocities[first + 1] = v_y * cos - v_x * sin
             elif kind == HINGE:
                 angle = data.qpos[address]
                 positions += [np.cos(angle), np.sin(angle)]
             elif kind == SLIDE and abs(model.jnt_axis[joint, 2]) > 0.5:
                 positions.append(data.qpos[address] / self.reach)
-        return np.array([*rotation[2, :2], *velocities, *positions])
+        # On a slope the heading matters.
+        heading = [] if self.is_level else [cos, sin]
+        return np.array([*rotation[2, :2], *heading, *velocities, *positions])
 
     def unwound(self, strides: int) -> np.ndarray:
         """Return qpos less the full turns of hinges that the clock drives in
@@ -495,6 +558,7 @@ class _Record:
         self.positions = [simulation.body.data.qpos.copy()]
         self.status = simulation.end_status()
         self.moves: list[np.ndarray] = []
+        self.starts = [0]  # numbers of the rows where strides start
         self.is_periodic = False
         self.drift = np.inf
         self.last_stride = 0
@@ -512,6 +576,7 @@ class _Record:
         if self.status:
             return self.status
 
+        self.starts.append(len(self.rows) - 1)
         self.moves.append(_move(self.rows[self.last_stride], self.rows[-1]))
         progress = np.full((3, 1), self.moves[-1][0])
         self._cycles = limit_cycle.after_massless_cycle(self._cycles, progress)
@@ -522,6 +587,13 @@ class _Record:
         is_settled = self.drift <= REMAINING_CHANGE * simulation.reach
         self.is_periodic = bool(is_settled and change < REPEATED)
         return ""
+
+    def late(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return rows and positions of the last stride of a periodic walk, of a few at
+        most of others."""
+        count = 1 if self.is_periodic else AVERAGED_CYCLES
+        first = self.starts[max(0, len(self.starts) - 1 - count)]
+        return np.array(self.rows[first:]), np.array(self.positions[first:])
 
     def goes_straight(self, duration: float | None) -> bool:
         """Return whether the last stride, repeated until the duration, s, follows a

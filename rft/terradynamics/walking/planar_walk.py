@@ -17,6 +17,7 @@ from rft.terradynamics.walking.engines import (
     Walker,
     with_more_elements,
 )
+from rft.terradynamics.walking.feet import Feet, planar_feet
 from rft.terradynamics.walking.planar.equations import Robots, State
 from rft.terradynamics.walking.planar.limit import (
     Limit,
@@ -26,6 +27,7 @@ from rft.terradynamics.walking.planar.limit import (
 )
 from rft.terradynamics.walking.planar.march import march
 from rft.terradynamics.walking.planar.stride import (
+    AVERAGED_CYCLES,
     STUCK,
     Strides,
     Walk,
@@ -122,11 +124,13 @@ def batch_strides(
     grounds = [w.ground for w in walkers]
     strength = np.array([g.strength * w.stress.zeta for g, w in zip(grounds, walkers)])
     flux = np.array([g.flux for g in grounds])
-    ground = Ground(strength, flux, numerics.rounding, np.sin(stress.grazing))
+    loss = np.array([g.downhill_loss for g in grounds])
+    ground = Ground(strength, flux, numerics.rounding, np.sin(stress.grazing), loss)
 
     designs = [w.robot for w in walkers]
     gaits = [w.gait for w in walkers]
-    robots = Robots(designs, gaits, stress, ground, numerics.elements)
+    slopes = [w.rise for w in walkers]
+    robots = Robots(designs, gaits, stress, ground, numerics.elements, slopes)
     return Strides(robots, designs, gaits, numerics.steps, advance)
 
 
@@ -157,7 +161,7 @@ def _walk_batch(
     walks = []
     for k in range(len(walkers)):
         one = _walk_until(strides, from_rest, k, durations[k])
-        one = one._replace(**limit_fields.get(k, {}))
+        one = one._replace(**(limit_fields.get(k) or _feet_at_end(strides, k, one)))
         if one.periodic and one.status == "walking":
             settling_time = _settling_time(strides, from_rest, k, one)
             one = one._replace(settling_time=settling_time)
@@ -178,7 +182,7 @@ def _walk_until(
     states = State(rows[:, 1:4], rows[:, 4:7], rows[:, 7], rows[:, 8], *zeros)
     speed = 0.0
     if t[-1]:
-        speed = rows[-1, 1] / t[-1]
+        speed = float(rows[-1, 1] / t[-1])
     return Walk(
         t,
         states.pose,
@@ -186,7 +190,7 @@ def _walk_until(
         states.work,
         states.loss,
         strides.robots.energy(states, k),
-        speed=float(speed),
+        speed=speed,
         status=str(from_rest.status[k]),
         cycles=0.0,
         periodic=False,
@@ -194,7 +198,29 @@ def _walk_until(
         limit=None,
         unsolved=int(from_rest.state.unsolved[k]),
         residual=float(from_rest.state.residual[k]),
+        speed_along=speed,
+        reach=float(strides.reach[k]),
     )
+
+
+def _feet_at_end(strides: Strides, k: int, walk: Walk) -> dict:
+    """Return the fields of `Walk` that belong to the feet of robot k, which came to an
+    end, over its last cycles."""
+    per_stride = len(strides.rate_phases)
+    most = AVERAGED_CYCLES * strides.cycle * per_stride
+    count = len(walk.t) - 1
+    step = np.arange(max(0, count - most), count)
+    if not step.size:
+        return {}
+    zeros = np.zeros((5, step.size + 1))
+    states = State(walk.pose[step[0] :], walk.twist[step[0] :], *zeros)
+    first = step // per_stride * strides.period
+    rate_phases = first + strides.rate_phases[step % per_stride]
+    begins = first + strides.phases[step % per_stride]
+    last = strides.phases[step[-1:] % per_stride + 1] + first[-1:]
+    phases = np.concatenate([begins, last])
+    feet = planar_feet(strides.robots, k, states, phases, rate_phases)
+    return {"foot_speed": feet.speed, "sinkage": feet.sinkage}
 
 
 def _settling_time(
@@ -229,10 +255,35 @@ def _fields_at_limits(
     them."""
     strides = batch_strides(walkers, numerics, advance)
     cycles = limit_cycles(strides, limits)
-    return [_limit_fields(strides, cycles, k) for k in range(len(limits))]
+    feet = _feet_at_limits(strides, cycles)
+    return [_limit_fields(strides, cycles, feet, k) for k in range(len(limits))]
 
 
-def _limit_fields(strides: Strides, cycles: LimitCycles, k: int) -> dict:
+def _feet_at_limits(strides: Strides, cycles: LimitCycles) -> list[Feet]:
+    """Return the feet of all robots in a cycle from their states at the limit."""
+    robots = np.arange(len(cycles.limits))
+    parts = zip(*(limit.state for limit in cycles.limits))
+    state = State(*(np.concatenate(x) for x in parts))
+    blocks = [State(*(x[None] for x in state))]
+    phases = [strides.phases[:1]]
+    rate_phases = []
+    for stride in range(strides.cycle):
+        ends, states = strides.run(state, stride, robots)
+        state = states.take(-1)
+        blocks.append(states)
+        phases.append(ends)
+        rate_phases.append(stride * strides.period + strides.rate_phases)
+    all_states = State(*(np.concatenate(x) for x in zip(*blocks)))
+    of_phases = np.concatenate(phases), np.concatenate(rate_phases)
+    return [
+        planar_feet(strides.robots, k, all_states.take(np.s_[:, k]), *of_phases)
+        for k in robots
+    ]
+
+
+def _limit_fields(
+    strides: Strides, cycles: LimitCycles, feet: list[Feet], k: int
+) -> dict:
     """Return the fields of `Walk` that belong to the limit cycle of robot k."""
     strides_per_second = strides.frequency[k] / strides.period
     limit = cycles.limits[k]
@@ -241,8 +292,12 @@ def _limit_fields(strides: Strides, cycles: LimitCycles, k: int) -> dict:
         least = STUCK * strides.period * strides.reach[k]
         is_stuck = abs(cycles.progress[k]) < least
         status = "stuck" if is_stuck else "walking"
+    speed = float(cycles.progress[k] * strides_per_second)
     return {
-        "speed": float(cycles.progress[k] * strides_per_second),
+        "speed": speed,
+        "speed_along": speed,
+        "foot_speed": feet[k].speed,
+        "sinkage": feet[k].sinkage,
         "status": status,
         "cycles": float(cycles.strides[k] * strides.period),
         "periodic": bool(cycles.periodic[k]),

@@ -87,7 +87,7 @@ def residual_and_slopes(
 ):
     """Return the residual of a robot's stage at its trial, the residual's slopes, three
     columns, and the powers of the motors and into the ground."""
-    mass, inertia, reach = body
+    mass, inertia, reach, along, normal = body
     nudge = difference_steps(ground[2], reach)
     residual = by_x = by_z = by_pitch = (0.0, 0.0, 0.0)
     power = (0.0, 0.0)
@@ -102,7 +102,9 @@ def residual_and_slopes(
         v = plus(step.newton.trial, change)
         pose = plus(step.stage.base, times(k, v))
         load = load_on_robot(law, ground, disturbed, robot, pose, v, angle, rate, sums)
-        changed = stage_residual(load, v, step.stage.start, k, mass, inertia)
+        changed = stage_residual(
+            load, v, step.stage.start, k, mass, inertia, (along, normal)
+        )
         if c == 0:
             residual = changed
             power = (load.motor_power, load.ground_power)
@@ -236,8 +238,8 @@ def run_steps(
     states = np.empty((len(lengths), *start.shape))
     evaluations = np.zeros(len(start), int)
     grounds = np.stack([np.broadcast_to(x, len(index)) for x in ground[:-1]], -1)
-    bodies = np.stack(
-        [robots.masses[index, 0], robots.masses[index, 2], robots.reach[index]], -1
+    bodies = np.column_stack(
+        [robots.masses[index][:, [0, 2]], robots.reach[index], robots.gravity[index]]
     )
 
     # The belly is the last "leg" and does not rotate.

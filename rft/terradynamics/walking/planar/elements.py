@@ -216,7 +216,7 @@ class Elements:
             ground.flux[robot],
             ground.rounding[robot],
             self.closed[part] * sine,
-            ground.downhill_loss,
+            ground.downhill_loss[robot],
             ground.disturbed,
         )
         forces = load(self.law, element_ground, e, g, side, bool(side.any()), True)

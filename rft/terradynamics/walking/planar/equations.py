@@ -7,13 +7,14 @@ rotate by the clock. `rft.terradynamics.walking.planar.march` steps in time.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from rft.core.metres import GRAVITY
 from rft.formulas.newton import plus, times
 from rft.formulas.vectors import formula
+from rft.laws.incline import gravity_on_incline
 from rft.terradynamics.ground import Ground
 from rft.terradynamics.plates.stress import PlateStress
 from rft.terradynamics.walking.planar.elements import Elements, Outlines
@@ -79,7 +80,9 @@ class State(NamedTuple):
 class Robots:
     """B robots of equally many legs and elements on one kind of ground.
 
-    ground: (B,), with one rounding for all, which is reduced for slow legs. masses:
+    x is along the surface, z along its normal. ground: (B,), with one rounding for all,
+    which is reduced for slow legs. slopes: angles by which the surfaces rise along x,
+    rad, (B,); all level by default. gravity: (B, 2), m/s^2, along x and z. masses:
     (B, 3), mass, mass and moment of inertia: those of x, z and pitch. frequency:
     (B, 1), Hz. hips: (2, B, K), x and z from the centre of mass, m. leg_phases: (K,),
     cycles. reach: (B,), m, of the legs from their hips."""
@@ -91,7 +94,11 @@ class Robots:
         stress: PlateStress,
         ground: Ground,
         elements: int,
+        slopes: Sequence[float] | None = None,
     ):
+        if slopes is None:
+            slopes = [0.0] * len(robots)
+        self.gravity = np.array([gravity_on_incline(angle) for angle in slopes])
         self.masses = _columns(robots, ("mass", "mass", "inertia"))
         self.frequency, *self.clock = _columns(
             gaits, ("frequency", "duty", "sweep", "middle")
@@ -125,6 +132,7 @@ class Robots:
         return ground._replace(
             strength=ground.strength[index],
             flux=ground.flux[index],
+            downhill_loss=ground.downhill_loss[index],
             rounding=ground.rounding[index] * width,
             grazing_sine=ground.grazing_sine * np.sqrt(width),
         )
@@ -136,11 +144,12 @@ class Robots:
         # A robot that keeps its pitch has an infinite inertia.
         inertia = np.where(np.isfinite(inertia), inertia, 0.0)
         v_x, v_z, rate = np.moveaxis(state.twist, -1, 0)
-        height = state.pose[..., 1]
+        x, z, _ = np.moveaxis(state.pose, -1, 0)
+        along, normal = self.gravity[index].T
         return (
             mass * (v_x**2 + v_z**2) / 2
             + inertia * rate**2 / 2
-            + mass * GRAVITY * height
+            - mass * (along * x + normal * z)
         )
 
     def start(self) -> State:
@@ -186,8 +195,16 @@ class Robots:
         twist = tuple(np.moveaxis(twist, -1, 0))
         ground = ground or self.ground_under(index)
         load = self.elements.load(ground, index, pose, twist, angle, rate)
-        a = accelerations(load, self.masses[index, 0], self.masses[index, 2])
+        a = accelerations(load, *self._inertias(index))
         return np.stack(a, -1), load.motor_power, load.ground_power
+
+    def _inertias(self, index) -> tuple:
+        """Return masses and moments of inertia (B,), and gravity, a pair of (B,)."""
+        return (
+            self.masses[index, 0],
+            self.masses[index, 2],
+            tuple(self.gravity[index].T),
+        )
 
     def residual(self, index, base, start, v, angle, rate, k, ground: Ground):
         """Return the residual of v = start + k a(base + k v, v) of these robots,
@@ -197,9 +214,7 @@ class Robots:
         trial = tuple(x + IS_CHANGED[j] * y for j, (x, y) in enumerate(zip(v, nudge)))
         pose = plus(base, times(k, trial))
         load = self.elements.load(ground, index, pose, trial, angle, rate)
-        residual = stage_residual(
-            load, trial, start, k, self.masses[index, 0], self.masses[index, 2]
-        )
+        residual = stage_residual(load, trial, start, k, *self._inertias(index))
         slopes = []
         for j, y in enumerate(nudge):
             slopes.append(tuple((x[j + 1] - x[0]) / y for x in residual))
@@ -208,16 +223,20 @@ class Robots:
 
 
 @formula
-def accelerations(load, mass, inertia):
+def accelerations(load, mass, inertia, gravity):
     """Return the accelerations (x, z, pitch) of a body under a `BodyLoad` and
-    gravity."""
-    return load.f_x / mass, load.f_z / mass - GRAVITY, load.moment / inertia
+    gravity (x, z)."""
+    return (
+        load.f_x / mass + gravity[0],
+        load.f_z / mass + gravity[1],
+        load.moment / inertia,
+    )
 
 
 @formula
-def stage_residual(load, v, start, k, mass, inertia):
+def stage_residual(load, v, start, k, mass, inertia, gravity):
     """Return v - start - k a, a triple, m/s and rad/s."""
-    x, z, pitch = accelerations(load, mass, inertia)
+    x, z, pitch = accelerations(load, mass, inertia, gravity)
     return v[0] - start[0] - k * x, v[1] - start[1] - k * z, v[2] - start[2] - k * pitch
 
 

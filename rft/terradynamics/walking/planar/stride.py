@@ -73,6 +73,16 @@ class Walk(NamedTuple):
     lateral_speed, yaw_rate : float
         Mean velocity to the left of the heading at a cycle's start, m/s, and rate to
         the left, rad/s, over the same time as the speed; 0 in the plane.
+    speed_along : float
+        Mean velocity along x over the same time as the speed, m/s: on a slope, along
+        the slope. That is the speed but for a robot that has turned.
+    turned : float
+        Angle to the left by which the robot has turned since the start, rad.
+    foot_speed, sinkage : float
+        `rft.terradynamics.walking.feet.Feet`, m/s and m, over the limit cycle, or until
+        the robot's end.
+    reach : float
+        Of the legs, m.
 
     Examples
     --------
@@ -104,6 +114,11 @@ class Walk(NamedTuple):
     settling_time: float = np.nan
     lateral_speed: float = 0.0
     yaw_rate: float = 0.0
+    speed_along: float = np.nan
+    turned: float = 0.0
+    foot_speed: float = np.nan
+    sinkage: float = np.nan
+    reach: float = np.nan
 
     @property
     def unaccounted(self) -> float:

@@ -34,6 +34,9 @@ class Grains:
             1e-7, 10, "m/s", "speed below which stress falls off in proportion to speed"
         ),
     ] = 3e-3
+    downhill_loss: Annotated[
+        float, Number(-1, 1, "-", "share of the strength lost in motion along +x")
+    ] = 0.0
 
     def __post_init__(self):
         require(
@@ -46,7 +49,13 @@ class Grains:
     @property
     def ground(self) -> Ground:
         """Ground under every face."""
-        return Ground(self.strength, self.flux, self.rounding, self.law.grazing_sine)
+        return Ground(
+            self.strength,
+            self.flux,
+            self.rounding,
+            self.law.grazing_sine,
+            self.downhill_loss,
+        )
 
 
 class Surface(NamedTuple):

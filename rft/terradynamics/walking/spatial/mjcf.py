@@ -399,6 +399,7 @@ def _require_sound(file: str, model) -> None:
         bool(is_down),
         "gravity must be along -z, because the ground is at z = 0",
         where=file,
+        instead='for a slope, use [[effects]] kind = "slope"',
     )
 
 

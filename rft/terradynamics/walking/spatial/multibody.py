@@ -16,6 +16,7 @@ import numpy as np
 
 from rft.core.notes import Note
 from rft.core.refusal import require
+from rft.laws.incline import gravity_on_incline
 from rft.mujoco import installed
 from rft.mujoco.bed import Bed
 from rft.mujoco.sand import require_passive
@@ -56,6 +57,8 @@ class Multibody:
         By default the controls are those in the data.
     substeps : int
         Steps of MuJoCo, by its integrator implicitfast, in a time step.
+    slope : float
+        Angle by which the surface rises along x, rad: gravity is turned by it about y.
 
     Attributes
     ----------
@@ -83,6 +86,7 @@ class Multibody:
         grains: Grains,
         control: Callable[[float, float], np.ndarray] | None = None,
         substeps: int = SUBSTEPS,
+        slope: float = 0.0,
     ):
         require(
             model.nv > 0, "nothing in the model can move", because="it has no joints"
@@ -96,6 +100,9 @@ class Multibody:
         mujoco.set_mju_user_warning(_ignore)
         model = copy.copy(model)
         _remove_contacts(model, surfaces)
+        if slope:
+            g_x, g_z = gravity_on_incline(slope, float(-model.opt.gravity[2]))
+            model.opt.gravity[:] = g_x, 0.0, g_z
         model.opt.enableflags |= ENERGY
         model.opt.disableflags |= NO_RESET
         model.opt.integrator = IMPLICIT_FAST
