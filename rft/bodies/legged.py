@@ -34,7 +34,9 @@ class LeggedChain:
     of the legs. A leg points away from its link; its foot is swing cos(psi) forward of
     that, rad about the shoulder, with psi = phi + lag + 2 pi phase of the leg. It
     touches while it swings backwards: while psi lies within pi duty of pi / 2. Feet are
-    short rods along the legs; legs and feet have no mass.
+    short rods along the legs; legs and feet have no mass. Legs of a pair that swing
+    half a cycle apart lie on one line: while both touch alike, dry friction may leave
+    their speed along it open, and the rounding decides.
 
     lengths (-): relative link lengths, tail to head. frame (-): as of a chain, of the
     links alone. legs (-): numbers of the links that carry a pair, from the tail, 1 for
@@ -282,4 +284,6 @@ class LeggedChain:
 
     @classmethod
     def examples(cls) -> dict[str, Any]:
-        return {"legged-chain": cls((1.2, 0.8, 1.0), legs=(1, 3), lag=0.3, duty=0.6)}
+        phases = ((0.0, 0.42), (0.55, 0.9))
+        body = cls((1.2, 0.8, 1.0), legs=(1, 3), phases=phases, lag=0.3, duty=0.6)
+        return {"legged-chain": body}

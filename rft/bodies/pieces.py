@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -50,10 +51,37 @@ class Pieces(WrappedBody):
         )
 
 
+@dataclass(frozen=True, eq=False)
+class PiecesWithContact(Pieces):
+    """Such pieces of a body whose elements touch the ground by its own rule."""
+
+    @property
+    def stations(self) -> np.ndarray:
+        """Places (n, 1) of the pieces along the body, 0 at its tail."""
+        owner, centre, _ = self._cuts
+        inner: Any = self.inner
+        half = half_lengths(inner)[owner, None]
+        return inner.stations[owner] + half * centre
+
+    def contact_factors(
+        self,
+        alpha: np.ndarray,
+        elements: Elements,
+        station: np.ndarray,
+        fraction: np.ndarray,
+    ) -> np.ndarray:
+        """Return the factors (n, B) of the drag on the pieces at shapes (joints, B):
+        those of their elements."""
+        inner: Any = self.inner
+        return inner.contact_factors(alpha, elements, station, fraction)[self._cuts[0]]
+
+
 def subdivide(body: Body, pieces: int) -> Body:
     """Return the body with at least ``pieces`` elements to its length; the body itself
     where its elements are short enough."""
     longest = 1 / pieces
     if (2 * half_lengths(body) > longest * (1 + 1e-9)).any():
+        if hasattr(body, "stations"):
+            return PiecesWithContact(body, longest)
         return Pieces(body, longest)
     return body

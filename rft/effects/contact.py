@@ -346,6 +346,8 @@ def _assembled(medium, body, effects, rule, pieces) -> Assembly:
             )
     if varies_along(body, effects):
         body = subdivide(body, pieces)
+    if hasattr(body, "contact_factors"):
+        touching = body
     effects = tuple(effect.in_body_lengths(body.length) for effect in effects)
     for each in members(medium):
         for effect in effects:

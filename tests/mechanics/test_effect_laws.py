@@ -22,7 +22,7 @@ from rft import (
     time_steps,
     work_done,
 )
-from rft.bodies.pieces import Pieces, subdivide
+from rft.bodies.pieces import subdivide
 from rft.core.refusal import Refusal
 from rft.effects.base import Site
 from rft.effects.contact import NO_MEMORY, assemble
@@ -225,7 +225,7 @@ def test_cutting_elements_changes_no_force_and_no_moment(name):
     alphadot = rng.normal(size=(20, body.joints))
     whole, pieces = (
         body_velocity(GLASS, x, alpha, alphadot, tolerance=1e-12).xi
-        for x in (body, Pieces(body, 0.03))
+        for x in (body, subdivide(body, 33))
     )
     np.testing.assert_allclose(pieces, whole, atol=1e-7)
 

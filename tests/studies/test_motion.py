@@ -27,6 +27,7 @@ from rft import (
     ConstantCurvature,
     DepthProfile,
     Granular,
+    LeggedChain,
     Serpenoid,
     Transient,
     time_steps,
@@ -65,6 +66,8 @@ def bends_of(body, alpha):
         n_each = body.elements // body.sections
         curvature = np.repeat(alpha, n_each) / n_each  # of each element
         return (curvature[1:] + curvature[:-1]) / 2
+    if isinstance(body, LeggedChain):
+        return alpha[:-1]
     return alpha
 
 
