@@ -75,7 +75,7 @@ def test_the_version_is_told_once_and_the_same_everywhere():
         ("geomech intrude sq", {"square-rod"}),
         ("geomech reference mo", {"motion"}),
         ("geomech accuracy sph", {"sphere"}),
-        ("geomech walk xpl", {"xplorer"}),
+        ("geomech walk sandb", {"sandbot"}),
         ("geomech symbolic diff", {"differential-drive"}),
         ("geomech --ver", {"--version"}),
     ],

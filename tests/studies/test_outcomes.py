@@ -127,6 +127,23 @@ def test_a_robot_slides_down_that_gathers_speed_downhill(
     assert outcomes.outcome(repeated, 1e-3, 2.0, rise) != outcomes.SLIDES
 
 
+@pytest.mark.parametrize(
+    ("degrees", "expected"),
+    [(0.0, outcomes.WALKS), (20.0, outcomes.STAYS), (35.0, outcomes.SLIDES)],
+)
+def test_a_light_wheel_walks_gets_stuck_and_slides_down(degrees, expected):
+    wheel = Roller(0.3, Wheel(0.1, 0.1))
+    scene = dataclasses.replace(
+        XPLORER,
+        robot=wheel,
+        gait=Tripod(0.5),
+        effects=(Slope(math.radians(degrees)),),
+        numerics=Fineness(),
+    )
+    (one,) = walked([scene], settling=True)
+    assert one.outcome(scene) == expected
+
+
 OVER = {
     "effects.slope.angle_deg": [-10.0, 0.0, 8.0, 22.0, 37.0],
     "gait.frequency": [1.0, 2.0],

@@ -134,7 +134,7 @@ def sweep_figure(
             instead="sweep one parameter, or leave ``data`` out",
         )
     if maps:
-        check_maps(count, "status" in result)
+        check_maps(count, "slip" in result)
         return _maps_of_walks(result)
     if "status" in result:
         return _speed_figure(scene, result, data)
@@ -255,15 +255,12 @@ def _uphill_values(uphill: Variable) -> tuple:
 
 
 def _mark_outcomes(
-    ax: Axes,
-    result: Result,
-    order: Any,
-    rising: list[np.ndarray],
+    ax: Axes, result: Result, order: Any, rising: list[np.ndarray]
 ) -> None:
-    """Mark the points of a sweep whose outcomes have marks, by default all but those of
-    a body that climbs or walks, with a legend if there are any."""
+    """Mark the points of a sweep at which a body does not do what it should, with a
+    legend if there are any."""
     _scatter_outcomes(ax, result, order, rising, OUTCOME_MARKS)
-    if ax.get_legend_handles_labels()[1]:
+    if np.isin(result["outcome"].values, [*OUTCOME_MARKS]).any():
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
 
 
