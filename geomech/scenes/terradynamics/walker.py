@@ -18,6 +18,7 @@ from rft.terradynamics.walking import (
     ROBOTS,
     Fineness,
     Mjcf,
+    PrintedGround,
     Robot,
     Screws,
     Tripod,
@@ -27,9 +28,9 @@ from rft.terradynamics.walking import (
 ATTACH = "use rft.mujoco.attach(model, medium, {} = ...) in your own loop"
 ELSEWHERE = {
     "slope": ATTACH.format("slope"),
-    "disturbed-ground": ATTACH.format("footprints"),
 }
 KINDS = {kind: effect for kind, effect in GROUND_EFFECTS.items() if effect.walks}
+KINDS[PrintedGround.kind] = PrintedGround
 LAWS = {"planar": StressKeys, "3d": SpatialKeys}
 # Keys that only a [medium] of three dimensions has.
 SPATIAL_KEYS = {"xi_n", "density", "internal_friction", "surface_friction"}

@@ -4,6 +4,7 @@ and screws at a given slip."""
 from rft.terradynamics.walking.craft import Screws
 from rft.terradynamics.walking.engines import ENGINES, Fineness, Walker, engine
 from rft.terradynamics.walking.planar.stride import Walk
+from rft.terradynamics.walking.prints import PrintedGround
 from rft.terradynamics.walking.robot import Rhex, Robot, Roller, Tripod
 from rft.terradynamics.walking.screws import (
     Cruise,
@@ -27,6 +28,7 @@ __all__ = [
     "Cruise",
     "Fineness",
     "Mjcf",
+    "PrintedGround",
     "Rhex",
     "Robot",
     "Roller",

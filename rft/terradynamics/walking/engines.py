@@ -14,13 +14,14 @@ from rft.terradynamics.ground import Ground, GroundEffect, checked_effects, grou
 from rft.terradynamics.meshes.forces.law import Spatial
 from rft.terradynamics.plates.stress import PlateStress
 from rft.terradynamics.walking.planar.stride import Walk, compute_stride
+from rft.terradynamics.walking.prints import PrintedGround
 from rft.terradynamics.walking.robot import SMALLEST_ROUNDING, Robot, Tripod
 
 
 @dataclass(frozen=True)
 class Walker:
     """A robot, its clock and its ground. stress: a stress map of the vertical plane, or
-    a law of three dimensions. effects: aeration and grain inertia.
+    a law of three dimensions. effects: aeration, grain inertia and printed ground.
 
     Examples
     --------
@@ -49,16 +50,35 @@ class Walker:
         object.__setattr__(self, "effects", checked_effects(self.effects))
         for effect in self.effects:
             require(
+                effect.kind != PrintedGround.kind or effect.walks,
+                f"{type(effect).__name__} is for intruders",
+                instead="use PrintedGround",
+            )
+            require(
                 effect.walks,
-                "walking supports the effects aeration and grain-inertia, not "
-                f"{effect.kind}",
+                "walking supports the effects aeration, grain-inertia and "
+                f"disturbed-ground, not {effect.kind}",
                 instead="remove it",
             )
+        printed = [e for e in self.effects if isinstance(e, PrintedGround)]
+        require(
+            len(printed) <= 1,
+            "disturbed-ground appears twice in effects",
+            instead="keep one of them",
+        )
 
     @property
     def ground(self) -> Ground:
         """Ground with all effects."""
         return ground_of(self.effects)
+
+    @property
+    def prints(self) -> PrintedGround | None:
+        """The effect by which the ground remembers steps, if there is one."""
+        for effect in self.effects:
+            if isinstance(effect, PrintedGround):
+                return effect
+        return None
 
 
 @dataclass(frozen=True)

@@ -189,14 +189,16 @@ class Robots:
         a = accelerations(load, self.masses[index, 0], self.masses[index, 2])
         return np.stack(a, -1), load.motor_power, load.ground_power
 
-    def residual(self, index, base, start, v, angle, rate, k, ground: Ground):
+    def residual(
+        self, index, base, start, v, angle, rate, k, ground: Ground, shares=None
+    ):
         """Return the residual of v = start + k a(base + k v, v) of these robots,
         triples of (B,), its slopes by differences, three columns, and power of the
-        motors and into the ground, W, (B,)."""
+        motors and into the ground, W, (B,). shares: as of `Elements.load`."""
         nudge = difference_steps(ground.rounding, self.reach[index])
         trial = tuple(x + IS_CHANGED[j] * y for j, (x, y) in enumerate(zip(v, nudge)))
         pose = plus(base, times(k, trial))
-        load = self.elements.load(ground, index, pose, trial, angle, rate)
+        load = self.elements.load(ground, index, pose, trial, angle, rate, shares)
         residual = stage_residual(
             load, trial, start, k, self.masses[index, 0], self.masses[index, 2]
         )

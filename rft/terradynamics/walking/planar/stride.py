@@ -73,6 +73,12 @@ class Walk(NamedTuple):
     lateral_speed, yaw_rate : float
         Mean velocity to the left of the heading at a cycle's start, m/s, and rate to
         the left, rad/s, over the same time as the speed; 0 in the plane.
+    step_length, step_strength : array (C,), optional
+        On ground that remembers, for each cycle from rest: progress, m, along the
+        heading at its start, and mean strength of the ground under limbs that were in
+        it, 1 for undisturbed ground.
+    prints : array (N, 2), optional
+        On ground that remembers, x and y of the prints, m, that the walk leaves.
 
     Examples
     --------
@@ -104,6 +110,9 @@ class Walk(NamedTuple):
     settling_time: float = np.nan
     lateral_speed: float = 0.0
     yaw_rate: float = 0.0
+    step_length: np.ndarray | None = None
+    step_strength: np.ndarray | None = None
+    prints: np.ndarray | None = None
 
     @property
     def unaccounted(self) -> float:
@@ -289,7 +298,7 @@ def walk_from_rest(
     count = len(strides.robots)
     every_robot = np.arange(count)
     state = strides.robots.start()
-    blocks = [[_rows(np.zeros(1), state.take([[k]]), 0)] for k in range(count)]
+    blocks = [[state_rows(np.zeros(1), state.take([[k]]), 0)] for k in range(count)]
     most = np.ceil(durations * strides.frequency / strides.period - 1e-9).astype(int)
     computed = np.zeros(count, int)
     status = np.full(count, "", "U10")
@@ -303,7 +312,7 @@ def walk_from_rest(
         phases, states = strides.run(state.take(active), stride, active)
         state = state.put(active, states.take(-1))
         for j, k in enumerate(active):
-            blocks[k].append(_rows(phases / strides.frequency[k], states, j))
+            blocks[k].append(state_rows(phases / strides.frequency[k], states, j))
         computed[active] = stride + 1
         status[active] = strides.end_status(state.take(active), active)
 
@@ -357,7 +366,7 @@ def map_period(before, last, now) -> np.ndarray:
     return np.where(limps, 2, 1)
 
 
-def _rows(t, states: State, k: int) -> np.ndarray:
+def state_rows(t, states: State, k: int) -> np.ndarray:
     """Return rows (T, 9) of t, pose, twist, work and loss of robot k."""
     return np.column_stack(
         [t, states.pose[:, k], states.twist[:, k], states.work[:, k], states.loss[:, k]]
