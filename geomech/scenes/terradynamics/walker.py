@@ -17,6 +17,7 @@ from rft.terradynamics.plates import PlateStress
 from rft.terradynamics.walking import (
     ROBOTS,
     Fineness,
+    Flippers,
     Mjcf,
     PrintedGround,
     Robot,
@@ -96,7 +97,8 @@ class WalkerScene:
         """The engine that computes it by default."""
         if self.numerics.engine:
             return self.numerics.engine
-        if isinstance(self.robot, Mjcf | Screws) or isinstance(self.medium, Spatial):
+        is_spatial = isinstance(self.robot, Mjcf | Screws | Flippers)
+        if is_spatial or isinstance(self.medium, Spatial):
             return "mujoco"
         return "planar"
 

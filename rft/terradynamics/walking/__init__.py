@@ -3,6 +3,7 @@ and screws at a given slip."""
 
 from rft.terradynamics.walking.craft import Screws
 from rft.terradynamics.walking.engines import ENGINES, Fineness, Walker, engine
+from rft.terradynamics.walking.flippers import Flippers
 from rft.terradynamics.walking.planar.stride import Walk
 from rft.terradynamics.walking.prints import PrintedGround
 from rft.terradynamics.walking.robot import Rhex, Robot, Roller, Tripod
@@ -20,6 +21,7 @@ ROBOTS: dict[str, type[Robot]] = {
     "rhex": Rhex,
     "wheel": Roller,
     "screws": Screws,
+    "flippers": Flippers,
 }  # by the name that scenes give
 
 __all__ = [
@@ -27,6 +29,7 @@ __all__ = [
     "ROBOTS",
     "Cruise",
     "Fineness",
+    "Flippers",
     "Mjcf",
     "PrintedGround",
     "Rhex",

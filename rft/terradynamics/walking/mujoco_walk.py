@@ -475,7 +475,7 @@ class Simulation:
         ``strides`` strides."""
         model = self.body.model
         qpos = self.body.data.qpos.copy()
-        if not strides:
+        if not strides or self.machine.stroke:
             return qpos
         for actuator in self.machine.driven:
             joint = model.actuator_trnid[actuator, 0]
