@@ -86,6 +86,8 @@ class Walk(Question):
         cycle = "no limit cycle found: mean over the computed time"
         if result["periodic"].values:
             cycle = f"limit cycle{settling_words(result)}"
+        elif "step_length" in result:
+            cycle = "mean over the last cycles: the ground remembers the steps"
         frequency = float(result["frequency"])
         return [f"{name}: {status} at {speed} at {frequency:g} Hz ({cycle})"]
 
@@ -116,6 +118,8 @@ class Walk(Question):
                 "unaccounted for"
             ),
         ]
+        if "step_length" in result and result["step_length"].values.size:
+            lines.insert(1, step_words(result))
         unsolved = int(result["unsolved"].values)
         if unsolved:
             residual = float(result["residual"])
@@ -163,6 +167,18 @@ def outcome_words(result: Result) -> str:
 
     name = str(result["outcome"].values)
     return f"{name}: {OUTCOMES[name]}"
+
+
+def step_words(result: Result) -> str:
+    """Return how the steps change, and the ground that they meet."""
+    lengths = result["step_length"]
+    strengths = result["step_strength"].values
+    first, last = lengths.values[0], lengths.values[-1]
+    return (
+        f"progress per cycle: {first:.3g} {lengths.unit} in the first, {last:.3g} "
+        f"{lengths.unit} in the last of {len(strengths)}; strength of the ground under "
+        f"the limbs: {strengths[0]:.3g} to {strengths[-1]:.3g}"
+    )
 
 
 def motion_words(result: Result) -> str:

@@ -17,7 +17,9 @@ from rft.terradynamics.plates import PlateStress
 from rft.terradynamics.walking import (
     ROBOTS,
     Fineness,
+    Flippers,
     Mjcf,
+    PrintedGround,
     Robot,
     Screws,
     Tripod,
@@ -25,9 +27,9 @@ from rft.terradynamics.walking import (
 )
 
 ATTACH = "use rft.mujoco.attach(model, medium, {} = ...) in your own loop"
-ELSEWHERE = {"disturbed-ground": ATTACH.format("footprints")}
 SLOPE = 'add [[effects]] with kind = "slope" and its angle'
 KINDS = {kind: effect for kind, effect in GROUND_EFFECTS.items() if effect.walks}
+KINDS[PrintedGround.kind] = PrintedGround
 LAWS = {"planar": StressKeys, "3d": SpatialKeys}
 # Keys that only a [medium] of three dimensions has.
 SPATIAL_KEYS = {"xi_n", "density", "internal_friction", "surface_friction"}
@@ -93,7 +95,8 @@ class WalkerScene:
         """The engine that computes it by default."""
         if self.numerics.engine:
             return self.numerics.engine
-        if isinstance(self.robot, Mjcf | Screws) or isinstance(self.medium, Spatial):
+        is_spatial = isinstance(self.robot, Mjcf | Screws | Flippers)
+        if is_spatial or isinstance(self.medium, Spatial):
             return "mujoco"
         return "planar"
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from geomech.core.summary import effect_lines, part
+from geomech.scenes.terradynamics import walker
 from rft.core.refusal import in_line
 from rft.terradynamics.ground import GROUND_EFFECTS
 
@@ -24,7 +25,7 @@ def scene_lines(scene: Intruding | WalkerScene) -> list[str]:
             f"medium: {named_part(scene.medium)}",
             f"engine: {scene.engine}",
         ]
-        possible = sorted(k for k, effect in GROUND_EFFECTS.items() if effect.walks)
+        possible = sorted(walker.KINDS)
     else:
         body = f"{named_part(scene.intruder)} of {scene.count:,} {scene.parts}"
         lines = [

@@ -138,12 +138,15 @@ def walked(
 ) -> list[Walked]:
     """Return the walks of scenes with equal numerics and engines, computed in batches.
 
-    by: the engine, in place of the scenes'. settling: a few cycles from rest suffice.
+    by: the engine, in place of the scenes'. settling: a few cycles from rest suffice,
+    unless the ground remembers the steps.
     progress: called with the fraction done."""
     numerics = scenes[0].numerics
     chosen = engine(by or scenes[0].engine)
     walkers = [scene.walker for scene in scenes]
-    cycles = SETTLING if settling else None
+    remembers = any(walker.prints for walker in walkers)
+    # On ground that remembers no limit cycle follows the first cycles.
+    cycles = SETTLING if settling and not remembers else None
     advance = runner().call
 
     def report(done: float) -> None:
@@ -245,7 +248,7 @@ def run(
 
 def variables(scene: WalkerScene, run: Walked) -> list[Variable]:
     """Return the means of a walk with their errors, its totals, and its motion."""
-    return [*means(scene, run), *totals(scene, run), *motion(run)]
+    return [*means(scene, run), *totals(scene, run), *steps_of(run), *motion(run)]
 
 
 def means(scene: WalkerScene, run: Walked) -> list[Variable]:
@@ -316,6 +319,20 @@ def totals(scene: WalkerScene, run: Walked) -> list[Variable]:
     ]
 
 
+def steps_of(run: Walked) -> list[Variable]:
+    """Return the steps of a walk on ground that remembers; none on other ground."""
+    walk = run.walk
+    if walk.step_length is None:
+        return []
+    progress = "progress in each cycle from rest, along the heading at its start"
+    strength = "mean strength of the ground under limbs in it, in each cycle"
+    over = ("cycle",)
+    return [
+        Variable("step_length", over, walk.step_length, "m", progress),
+        Variable("step_strength", over, walk.step_strength, "1", strength),
+    ]
+
+
 def motion(run: Walked) -> list[Variable]:
     """Return the motion in time: pose, velocity and energies, in three dimensions also
     y, roll, yaw and the states of the engine, from which it is drawn."""
@@ -363,7 +380,9 @@ def walk_cost(
     with located(scene.name):
         chosen = engine(name)
 
-    most = SETTLING if settling else numerics.duration * scene.gait.frequency
+    most = numerics.duration * scene.gait.frequency
+    if settling and not scene.walker.prints:
+        most = SETTLING
     cycles = min(most, 2 * LIMIT + _accelerating_cycles(scene))
     error_cycles = LIMIT * sum(refined.cost for refined in chosen.variations(numerics))
 
@@ -373,7 +392,12 @@ def walk_cost(
         walkers = [scene.walker] * batch
         step_seconds, evaluations = chosen.step_cost(walkers, numerics, PILOT)
 
-    if evaluations > MANY_EVALUATIONS:
+    if scene.walker.prints:
+        # No cycle repeats the last one: all are computed, and so are their errors.
+        cycles = math.ceil(most)
+        shares = sum(refined.cost for refined in chosen.variations(numerics))
+        error_cycles = cycles * shares
+    elif evaluations > MANY_EVALUATIONS:
         cycles = most + FAILED_SEARCH
     elif isinstance(scene.robot, Mjcf):
         # Custom machines may have no limit cycle.

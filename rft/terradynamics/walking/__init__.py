@@ -3,7 +3,9 @@ and screws at a given slip."""
 
 from rft.terradynamics.walking.craft import Screws
 from rft.terradynamics.walking.engines import ENGINES, Fineness, Walker, engine
+from rft.terradynamics.walking.flippers import Flippers
 from rft.terradynamics.walking.planar.stride import Walk
+from rft.terradynamics.walking.prints import PrintedGround
 from rft.terradynamics.walking.robot import Rhex, Robot, Roller, Tripod
 from rft.terradynamics.walking.screws import (
     Cruise,
@@ -19,6 +21,7 @@ ROBOTS: dict[str, type[Robot]] = {
     "rhex": Rhex,
     "wheel": Roller,
     "screws": Screws,
+    "flippers": Flippers,
 }  # by the name that scenes give
 
 __all__ = [
@@ -26,7 +29,9 @@ __all__ = [
     "ROBOTS",
     "Cruise",
     "Fineness",
+    "Flippers",
     "Mjcf",
+    "PrintedGround",
     "Rhex",
     "Robot",
     "Roller",

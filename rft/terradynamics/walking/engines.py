@@ -21,6 +21,7 @@ from rft.terradynamics.ground import (
 from rft.terradynamics.meshes.forces.law import Spatial
 from rft.terradynamics.plates.stress import PlateStress
 from rft.terradynamics.walking.planar.stride import Walk, compute_stride
+from rft.terradynamics.walking.prints import PrintedGround
 from rft.terradynamics.walking.robot import SMALLEST_ROUNDING, Robot, Tripod
 
 
@@ -58,6 +59,11 @@ class Walker:
         for effect in self.effects:
             kinds = sorted(k for k, kind in GROUND_EFFECTS.items() if kind.walks)
             require(
+                effect.kind != PrintedGround.kind or effect.walks,
+                f"{type(effect).__name__} is for intruders",
+                instead="use PrintedGround",
+            )
+            require(
                 effect.walks,
                 f"walking supports the effects {', '.join(kinds)}, not {effect.kind}",
                 instead="remove it",
@@ -67,6 +73,12 @@ class Walker:
                 f"a robot has a mass of its own, {effect.kind} needs none",
                 instead=f"remove ``mass`` of {effect.kind}",
             )
+        printed = [e for e in self.effects if isinstance(e, PrintedGround)]
+        require(
+            len(printed) <= 1,
+            "disturbed-ground appears twice in effects",
+            instead="keep one of them",
+        )
 
     @property
     def ground(self) -> Ground:
@@ -77,6 +89,14 @@ class Walker:
     def rise(self) -> float:
         """Angle by which the surface rises ahead of the robot, rad."""
         return rise_of(self.effects)
+
+    @property
+    def prints(self) -> PrintedGround | None:
+        """The effect by which the ground remembers steps, if there is one."""
+        for effect in self.effects:
+            if isinstance(effect, PrintedGround):
+                return effect
+        return None
 
 
 @dataclass(frozen=True)

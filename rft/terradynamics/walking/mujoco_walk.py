@@ -127,7 +127,9 @@ def walk(
         duration = numerics.duration
         if cycles:
             duration = cycles / walker.gait.frequency
-        most = math.ceil(duration * walker.gait.frequency - 1e-9) + MOST_STRIDES
+        most = math.ceil(duration * walker.gait.frequency - 1e-9)
+        if not walker.prints:
+            most += MOST_STRIDES
 
         def report(fraction):
             if progress:
@@ -252,6 +254,7 @@ class Simulation:
             self.clock,
             _substeps(walker, self.machine.model),
             walker.rise,
+            walker.prints,
         )
         self.clock.set_start(self.body)
         self.intervals = intervals(self.clock.kinks(), numerics.steps)
@@ -290,8 +293,10 @@ class Simulation:
             if record.is_periodic and record.goes_straight(duration):
                 break
 
+        # Strides on ground that remembers do not follow from their starts alone.
+        remembers = body.memory is not None
         limit = None
-        if not record.status:
+        if not record.status and not remembers:
             limit = Start(self.unwound(stride + 1), body.data.qvel.copy())
         means, drift, status = self.means(
             np.array(record.rows),
@@ -343,6 +348,7 @@ class Simulation:
             foot_speed=feet.speed,
             sinkage=feet.sinkage,
             reach=self.reach,
+            **record.of_prints(),
         )
 
     def means(
@@ -532,7 +538,7 @@ class Simulation:
         ``strides`` strides."""
         model = self.body.model
         qpos = self.body.data.qpos.copy()
-        if not strides:
+        if not strides or self.machine.stroke:
             return qpos
         for actuator in self.machine.driven:
             joint = model.actuator_trnid[actuator, 0]
@@ -565,6 +571,7 @@ class _Record:
         self._cycles = limit_cycle.begin(1)
         self._state = simulation.scaled_state()
         self._defect = 0.0
+        self._strengths: list[float] = []
 
     def add_stride(self, stride: int) -> str:
         """Compute a stride, and return the status after it."""
@@ -586,6 +593,11 @@ class _Record:
         self._state = state
         is_settled = self.drift <= REMAINING_CHANGE * simulation.reach
         self.is_periodic = bool(is_settled and change < REPEATED)
+        memory = simulation.body.memory
+        if memory is not None:
+            self.is_periodic = False
+            self._strengths.append(memory.mean_strength)
+            simulation.body.memory = memory._replace(met=0.0, count=0)
         return ""
 
     def late(self) -> tuple[np.ndarray, np.ndarray]:
@@ -594,6 +606,17 @@ class _Record:
         count = 1 if self.is_periodic else AVERAGED_CYCLES
         first = self.starts[max(0, len(self.starts) - 1 - count)]
         return np.array(self.rows[first:]), np.array(self.positions[first:])
+
+    def of_prints(self) -> dict[str, np.ndarray]:
+        """Return the fields of `Walk` on ground that remembers."""
+        memory = self.simulation.body.memory
+        if memory is None:
+            return {}
+        return {
+            "step_length": np.array([move[0] for move in self.moves]),
+            "step_strength": np.array(self._strengths),
+            "prints": memory.prints,
+        }
 
     def goes_straight(self, duration: float | None) -> bool:
         """Return whether the last stride, repeated until the duration, s, follows a

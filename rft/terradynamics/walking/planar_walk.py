@@ -18,6 +18,7 @@ from rft.terradynamics.walking.engines import (
     with_more_elements,
 )
 from rft.terradynamics.walking.feet import Feet, planar_feet
+from rft.terradynamics.walking.planar import printed
 from rft.terradynamics.walking.planar.equations import Robots, State
 from rft.terradynamics.walking.planar.limit import (
     Limit,
@@ -36,6 +37,7 @@ from rft.terradynamics.walking.planar.stride import (
     cycles_to_settle,
     walk_from_rest,
 )
+from rft.terradynamics.walking.prints import Memory
 from rft.terradynamics.walking.robot import Rhex, Roller
 
 ORDER = 2  # of the time steps
@@ -86,7 +88,10 @@ def walk(
                 progress((k + fraction) / len(batches))
 
         batch = [walkers[j] for j in members]
-        batch_walks = _walk_batch(batch, numerics, cycles, report, advance)
+        if batch[0].prints:
+            batch_walks = _walk_on_prints(batch, numerics, cycles, report, advance)
+        else:
+            batch_walks = _walk_batch(batch, numerics, cycles, report, advance)
         for j, one in zip(members, batch_walks):
             walks[j] = one
     return walks
@@ -111,7 +116,15 @@ def _batch_key(walker: Walker, elements: int) -> str:
             is_plain = outline.smooth_normals is None
             shapes.append((outline.elements, outline.closed, is_plain))
     stress = replace(walker.stress, zeta=1.0)
-    key = (type(robot), len(robot.hips), tuple(shapes), stress, walker.gait.kinks)
+    remembers = walker.prints is not None
+    key = (
+        type(robot),
+        len(robot.hips),
+        tuple(shapes),
+        stress,
+        walker.gait.kinks,
+        remembers,
+    )
     return repr(key)
 
 
@@ -168,6 +181,41 @@ def _walk_batch(
         cycles_from_rest = from_rest.strides[k] * strides.period
         walks.append(one._replace(cycles=one.cycles + cycles_from_rest))
     return walks
+
+
+def _walk_on_prints(
+    walkers: Sequence[Walker],
+    numerics: Fineness,
+    cycles: int | None,
+    progress: Callable,
+    advance: Callable,
+) -> list[Walk]:
+    """Return the walks of walkers on ground that remembers, one after another."""
+    walks = []
+    for k, walker in enumerate(walkers):
+
+        def report(fraction, k=k):
+            progress((k + fraction) / len(walkers))
+
+        strides = printed_strides(walker, numerics, advance)
+        duration = numerics.duration
+        if cycles:
+            duration = cycles / walker.gait.frequency
+        from_rest, fields = printed.walk_from_rest(strides, duration, report)
+        own = strides.strides
+        one = _walk_until(own, from_rest, 0, duration)
+        count = from_rest.strides[0] * own.period
+        walks.append(one._replace(**{"cycles": count, **fields}))
+    return walks
+
+
+def printed_strides(
+    walker: Walker, numerics: Fineness, advance: Callable = compute_stride
+) -> printed.PrintedStrides:
+    """Return the strides of one walker on ground that remembers."""
+    assert walker.prints is not None
+    strides = batch_strides([walker], numerics, advance)
+    return printed.PrintedStrides(strides, walker.prints, walker.robot)
 
 
 def _walk_until(
@@ -357,6 +405,8 @@ def step_cost(
 ) -> tuple[float, float]:
     """Return the cost of a time step; see
     `rft.terradynamics.walking.engines.Engine.step_cost`."""
+    if walkers[0].prints:
+        return _step_cost_on_prints(walkers, numerics)
     strides = batch_strides(walkers, numerics)
     robots = np.arange(len(walkers))
     end_heights = (strides.top, strides.airborne_height)
@@ -382,3 +432,20 @@ def step_cost(
             break
     elapsed = time.process_time() - begin
     return elapsed / n_steps, evaluations / n_steps
+
+
+def _step_cost_on_prints(
+    walkers: Sequence[Walker], numerics: Fineness
+) -> tuple[float, float]:
+    """Return the cost of a time step on ground that remembers, from a stride; the
+    evaluations of forces are not counted."""
+    strides = printed_strides(walkers[0], numerics)
+    robots = strides.strides.robots
+    memory = Memory.undisturbed(len(strides.y))
+    # The first stride loads compiled code.
+    state, memory = strides.states(0, robots.start(), memory)
+    begin = time.process_time()
+    strides.states(1, state.take(-1), memory)
+    elapsed = time.process_time() - begin
+    steps = len(strides.strides.rate_phases)
+    return len(walkers) * elapsed / steps, 0.0

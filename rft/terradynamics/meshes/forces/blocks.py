@@ -57,6 +57,23 @@ class Blocks:
         first = np.concatenate([[0], np.cumsum([len(table) for table in tables])])
         return np.ascontiguousarray(np.concatenate(tables)), first
 
+    def set_shares(self, shares: np.ndarray) -> None:
+        """Let each body bear a share (B,) of its loads from now on, as if its faces had
+        that share of their areas."""
+        index = Face._fields.index("area")
+        table, first = self.rows
+        for body, share in enumerate(shares):
+            faces = slice(self.first[body], self.first[body + 1])
+            rows = slice(first[body], first[body + 1])
+            self.faces.area[faces] = share * self._areas[0][faces]
+            table[rows, index] = share * self._areas[1][rows]
+
+    @cached_property
+    def _areas(self) -> tuple[np.ndarray, np.ndarray]:
+        """Areas of the faces (T,), and of the rows of eight (R, 8), m^2."""
+        area = Face._fields.index("area")
+        return self.faces.area.copy(), self.rows[0][:, area].copy()
+
     @cached_property
     def row_spheres(self) -> np.ndarray:
         """Middles and radii, m, of spheres around the faces of each row, (R, 4)."""

@@ -15,6 +15,7 @@ from rft.formulas.newton import plus, times
 from rft.formulas.simd import WIDTH, register_formulas
 from rft.terradynamics.ground import Ground
 from rft.terradynamics.plates.compiled import force_on_elements
+from rft.terradynamics.plates.contact import Force
 from rft.terradynamics.walking.planar.elements import BodyLoad, body_load, part_motion
 from rft.terradynamics.walking.planar.equations import (
     Robots,
@@ -51,8 +52,9 @@ def load_on_robot(law, ground, disturbed, robot, pose, twist, angle, rate, sums)
     """Return the `BodyLoad` of the ground on one robot.
 
     robot: the table of elements, and of its parts the first and last rows, sides, legs,
-    whether they are closed, and hips (2, P). sums: space for sums of forces."""
-    table, blocks, side, leg, closed, hips = robot
+    whether they are closed, hips (2, P), and shares of the force of undisturbed ground
+    (P,). sums: space for sums of forces."""
+    table, blocks, side, leg, closed, hips, shares = robot
     strength, flux, rounding, grazing_sine, downhill_loss = ground
     total = BodyLoad(0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -67,6 +69,7 @@ def load_on_robot(law, ground, disturbed, robot, pose, twist, angle, rate, sums)
         f = force_on_elements(
             law, part_ground, table, blocks[p, 0], blocks[p, 1], g, side[p], True, sums
         )
+        f = Force(f.x * shares[p], f.z * shares[p], f.moment * shares[p])
         total = add_loads(total, body_load(f, g, r_x, r_z, leg_rate))
     return total
 
@@ -188,7 +191,7 @@ def kernel(Law: type):
         end_heights, effort, states, evaluations,
     ):  # fmt: skip
         law = Law(*numbers)
-        table, blocks, hips = elements
+        table, blocks, hips, shares = elements
         side, leg, closed = parts
         angles, rates = clock
         count = len(lengths)
@@ -198,7 +201,7 @@ def kernel(Law: type):
 
         for b in range(len(start)):
             step = read_state(start[b])
-            robot = (table, blocks[b], side, leg, closed, hips[:, b])
+            robot = (table, blocks[b], side, leg, closed, hips[:, b], shares[b])
             s = 0
             while s < count:
                 step, is_over = advance_stage(
@@ -230,6 +233,7 @@ def run_steps(
     lengths,
     end_heights,
     effort: Effort,
+    shares=None,
 ):
     """Return the same states and evaluations as
     `rft.terradynamics.walking.planar.march.run_steps_by_numpy`."""
@@ -248,11 +252,14 @@ def run_steps(
 
     table, blocks = elements.table
     hips = np.ascontiguousarray(elements.hips[:, index])
+    if shares is None:
+        shares = np.ones((len(index), len(robots.leg_phases)))
+    of_parts = np.ascontiguousarray(elements.shares_of_parts(shares))
     kernel(type(elements.law))(
         tuple(elements.law),
         grounds,
         ground.disturbed,
-        (table, blocks[index], hips),
+        (table, blocks[index], hips, of_parts),
         (elements.side, elements.leg, elements.closed),
         bodies,
         np.ascontiguousarray(start),

@@ -154,12 +154,15 @@ class Elements:
         sizes = [x.elements.area.shape[1] for x in outlines]
         self.part = np.repeat(np.arange(len(parts)), sizes)
 
-    def load(self, ground: Ground, index, pose, twist, angle, rate) -> BodyLoad:
+    def load(
+        self, ground: Ground, index, pose, twist, angle, rate, shares=None
+    ) -> BodyLoad:
         """Return the load (C, B) on the robots ``index`` (B,).
 
         pose, twist: (x, z, pitch) and rates, triples of (C, B); the C motions of a
         robot hardly differ. angle, rate: (B, legs), of the legs, rad and rad/s. ground:
-        that of these robots, (B,)."""
+        that of these robots, (B,). shares: (B, legs), of the force of undisturbed
+        ground on each leg; by default all of it."""
         belly = np.zeros((len(index), 1))
         angle = np.concatenate([angle, belly], 1)[:, self.leg]
         rate = np.concatenate([rate, belly], 1)[:, self.leg]
@@ -170,7 +173,16 @@ class Elements:
         for row, x in zip(motions, g):
             row[:] = x
         force = Force(*self._part_forces(ground, index, motions))
+        if shares is not None:
+            of_parts = self.shares_of_parts(shares)
+            force = Force(*(x * of_parts for x in force))
         return BodyLoad(*(x.sum(-1) for x in body_load(force, g, r_x, r_z, rate)))
+
+    def shares_of_parts(self, shares) -> np.ndarray:
+        """Return shares (B, P) of the parts from those of the legs (B, legs); the belly
+        has all of the force."""
+        belly = np.ones((len(shares), 1))
+        return np.concatenate([shares, belly], 1)[:, self.leg]
 
     @cached_property
     def table(self) -> tuple[np.ndarray, np.ndarray]:

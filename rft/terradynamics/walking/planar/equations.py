@@ -206,14 +206,16 @@ class Robots:
             tuple(self.gravity[index].T),
         )
 
-    def residual(self, index, base, start, v, angle, rate, k, ground: Ground):
+    def residual(
+        self, index, base, start, v, angle, rate, k, ground: Ground, shares=None
+    ):
         """Return the residual of v = start + k a(base + k v, v) of these robots,
         triples of (B,), its slopes by differences, three columns, and power of the
-        motors and into the ground, W, (B,)."""
+        motors and into the ground, W, (B,). shares: as of `Elements.load`."""
         nudge = difference_steps(ground.rounding, self.reach[index])
         trial = tuple(x + IS_CHANGED[j] * y for j, (x, y) in enumerate(zip(v, nudge)))
         pose = plus(base, times(k, trial))
-        load = self.elements.load(ground, index, pose, trial, angle, rate)
+        load = self.elements.load(ground, index, pose, trial, angle, rate, shares)
         residual = stage_residual(load, trial, start, k, *self._inertias(index))
         slopes = []
         for j, y in enumerate(nudge):

@@ -33,7 +33,13 @@ NO_END = (np.inf, np.inf)
 
 
 def march(
-    robots: Robots, index, state: State, phases, rate_phases, end_heights=NO_END
+    robots: Robots,
+    index,
+    state: State,
+    phases,
+    rate_phases,
+    end_heights=NO_END,
+    shares=None,
 ) -> tuple[State, np.ndarray]:
     """Return the states after every step (S, B) of the robots ``index`` from a state,
     and the number of evaluations of forces for each (B,).
@@ -41,7 +47,8 @@ def march(
     The steps go from phase to phase (S + 1,), in cycles. In each the legs rotate at the
     rates of the clock at ``rate_phases`` (S,), which determine the side of a kink.
     end_heights: as for `rft.terradynamics.walking.planar.sdirk.has_ended`; a robot at
-    an end stays there."""
+    an end stays there. shares: (B, legs), of the force of undisturbed ground on each
+    leg; by default all of it."""
     index = np.asarray(index)
     phases = np.asarray(phases)
     starts = np.broadcast_to(phases[:-1, None], (len(rate_phases), len(index)))
@@ -57,7 +64,15 @@ def march(
     else:
         run_steps = run_steps_by_numpy
     states, evaluations = run_steps(
-        robots, index, state.to_array(), angles, rates, lengths, end_heights, EFFORT
+        robots,
+        index,
+        state.to_array(),
+        angles,
+        rates,
+        lengths,
+        end_heights,
+        EFFORT,
+        shares,
     )
     return State.from_array(states), evaluations
 
@@ -81,12 +96,14 @@ def run_steps_by_numpy(
     lengths,
     end_heights,
     effort: Effort,
+    shares=None,
 ):
     """Return the states after each step (S, B, 11) and the numbers of evaluations (B,),
     from states as arrays (B, 11).
 
     angles: (S, B, K), of the legs at the beginning of each step, rad. rates: (S, B, K),
-    rad/s. lengths: (S, B), s. end_heights: (2, B), m."""
+    rad/s. lengths: (S, B), s. end_heights: (2, B), m. shares: (B, K), as of
+    `march`."""
     count, size = lengths.shape
     states = np.empty((count, *start.shape))
     evaluations = np.zeros(size, int)
@@ -102,7 +119,7 @@ def run_steps_by_numpy(
         h = steps.stage.part * length
         steps, is_over = _advance_stages(
             robots, robot, steps, h, length, angles[number, column],
-            rates[number, column], effort,
+            rates[number, column], effort, None if shares is None else shares[column],
         )  # fmt: skip
         evaluations[column] += 1
         if not is_over.any():
@@ -134,12 +151,14 @@ def _advance_stages(
     start_angle: np.ndarray,
     rate: np.ndarray,
     effort: Effort,
+    shares: np.ndarray | None,
 ) -> tuple[Step, np.ndarray]:
     """Return robots after one evaluation of forces, and whether their time steps are
     over (B,).
 
     h, length: (B,), s, of the present part of the step and of the step. start_angle:
-    (B, K), rad, of the legs at the beginning of the step. rate: (B, K), rad/s."""
+    (B, K), rad, of the legs at the beginning of the step. rate: (B, K), rad/s.
+    shares: (B, K), as of `march`."""
     k = GAMMA * h
     width = gather(effort.widths, steps.newton.width, 0)
     ground = robots.ground_under(index, width)
@@ -154,6 +173,7 @@ def _advance_stages(
         rate,
         k,
         ground,
+        shares,
     )
     newton, is_solved, has_failed = newton_step(
         steps.newton, residual, slopes, power, k, robots.reach[index], tolerance, effort

@@ -83,6 +83,12 @@ class Walk(NamedTuple):
         the robot's end.
     reach : float
         Of the legs, m.
+    step_length, step_strength : array (C,), optional
+        On ground that remembers, for each cycle from rest: progress, m, along the
+        heading at its start, and mean strength of the ground under limbs that were in
+        it, 1 for undisturbed ground.
+    prints : array (N, 2), optional
+        On ground that remembers, x and y of the prints, m, that the walk leaves.
 
     Examples
     --------
@@ -119,6 +125,9 @@ class Walk(NamedTuple):
     foot_speed: float = np.nan
     sinkage: float = np.nan
     reach: float = np.nan
+    step_length: np.ndarray | None = None
+    step_strength: np.ndarray | None = None
+    prints: np.ndarray | None = None
 
     @property
     def unaccounted(self) -> float:
@@ -304,7 +313,7 @@ def walk_from_rest(
     count = len(strides.robots)
     every_robot = np.arange(count)
     state = strides.robots.start()
-    blocks = [[_rows(np.zeros(1), state.take([[k]]), 0)] for k in range(count)]
+    blocks = [[state_rows(np.zeros(1), state.take([[k]]), 0)] for k in range(count)]
     most = np.ceil(durations * strides.frequency / strides.period - 1e-9).astype(int)
     computed = np.zeros(count, int)
     status = np.full(count, "", "U10")
@@ -318,7 +327,7 @@ def walk_from_rest(
         phases, states = strides.run(state.take(active), stride, active)
         state = state.put(active, states.take(-1))
         for j, k in enumerate(active):
-            blocks[k].append(_rows(phases / strides.frequency[k], states, j))
+            blocks[k].append(state_rows(phases / strides.frequency[k], states, j))
         computed[active] = stride + 1
         status[active] = strides.end_status(state.take(active), active)
 
@@ -372,7 +381,7 @@ def map_period(before, last, now) -> np.ndarray:
     return np.where(limps, 2, 1)
 
 
-def _rows(t, states: State, k: int) -> np.ndarray:
+def state_rows(t, states: State, k: int) -> np.ndarray:
     """Return rows (T, 9) of t, pose, twist, work and loss of robot k."""
     return np.column_stack(
         [t, states.pose[:, k], states.twist[:, k], states.work[:, k], states.loss[:, k]]

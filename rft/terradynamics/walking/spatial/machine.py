@@ -9,8 +9,9 @@ import mujoco
 import numpy as np
 
 from rft.terradynamics.walking.craft import Screws
+from rft.terradynamics.walking.flippers import Flippers
 from rft.terradynamics.walking.robot import Robot, Tripod
-from rft.terradynamics.walking.spatial import craft_model, hexapod
+from rft.terradynamics.walking.spatial import craft_model, flipper_model, hexapod
 from rft.terradynamics.walking.spatial.facets import Surface
 from rft.terradynamics.walking.spatial.mjcf import Mjcf
 from rft.terradynamics.walking.spatial.multibody import Multibody
@@ -32,13 +33,15 @@ class Machine(NamedTuple):
 
     model: compiled. surfaces: those that touch the ground. root: number of the body
     that walks. driven: (K,), numbers of the actuators that follow the clock. phases:
-    (K,), of these, cycles."""
+    (K,), of these, cycles. stroke: of a robot whose actuators move to and fro; None if
+    they turn round."""
 
     model: mujoco.MjModel
     surfaces: list[Surface]
     root: int
     driven: np.ndarray
     phases: np.ndarray
+    stroke: Flippers | None = None
 
 
 def build_machine(
@@ -59,6 +62,13 @@ def build_machine(
         model = mujoco.MjModel.from_xml_string(craft_model.mjcf(robot))
         surfaces = craft_model.surfaces(robot, elements)
         return Machine(model, surfaces, 1, np.arange(2), np.zeros(2))
+
+    if isinstance(robot, Flippers):
+        model = mujoco.MjModel.from_xml_string(flipper_model.mjcf(robot))
+        surfaces = flipper_model.surfaces(robot, elements)
+        # A walk begins in the middle of the time between strokes.
+        phases = np.full(model.nu, 0.5)
+        return Machine(model, surfaces, 1, np.arange(model.nu), phases, robot)
 
     model = mujoco.MjModel.from_xml_string(hexapod.mjcf(robot, elements, planar))
     surfaces = hexapod.surfaces(robot, pieces * elements)
@@ -99,6 +109,11 @@ class Clock:
         f = self.gait.frequency
         phase = f * time + self.machine.phases
         rate_phase = f * rate_time + self.machine.phases
+        stroke = self.machine.stroke
+        if stroke:
+            # Arm and lift of one side after the other, all at one phase.
+            lengths, rates = stroke.stroke(self.gait, phase[0], rate_phase[0])
+            return np.tile(lengths, 2), f * np.tile(rates, 2)
         return self.gait.angle(phase, rate_phase), f * self.gait.rate(rate_phase)
 
     def __call__(self, time: float, rate_time: float) -> np.ndarray:
@@ -113,9 +128,13 @@ class Clock:
     def kinks(self) -> list[float]:
         """Return the phases, from 0 to 1, at which an actuator's rate may jump, with
         both ends."""
-        if len(self.gait.kinks) == 2:
-            return [0.0, 1.0]
         kinks = {0.0, 1.0}
+        if self.machine.stroke:
+            for kink in self.machine.stroke.kinks(self.gait) - self.machine.phases[0]:
+                kinks.add(round(float(kink), 12) % 1.0)
+            return sorted(kinks)
+        if len(self.gait.kinks) == 2:
+            return sorted(kinks)
         for phase in self.machine.phases:
             for side in (-1, 1):
                 end_of_stance = (side * self.gait.duty / 2 - phase) % 1.0

@@ -22,6 +22,7 @@ from rft.mujoco.bed import Bed
 from rft.mujoco.sand import require_passive
 from rft.terradynamics.meshes.forces.contact import faces
 from rft.terradynamics.meshes.forces.zones import EVERYWHERE
+from rft.terradynamics.walking.prints import Limb, Memory, PrintedGround, meet
 from rft.terradynamics.walking.spatial.facets import Facets, Grains, Surface
 
 SUBSTEPS = 16  # steps of MuJoCo in a time step
@@ -59,6 +60,9 @@ class Multibody:
         Steps of MuJoCo, by its integrator implicitfast, in a time step.
     slope : float
         Angle by which the surface rises along x, rad: gravity is turned by it about y.
+    prints : PrintedGround, optional
+        How the ground remembers limbs, all bodies of the surfaces but roots; by
+        default not at all.
 
     Attributes
     ----------
@@ -75,6 +79,8 @@ class Multibody:
         lacks at most.
     iterations : int
         Of Newton's method for the grains' forces, in all.
+    memory : Memory, optional
+        What the ground remembers.
     size : array (nv,)
         Speed, m/s, per unit of each velocity: 1, or a reach, m, for rotations.
     """
@@ -87,6 +93,7 @@ class Multibody:
         control: Callable[[float, float], np.ndarray] | None = None,
         substeps: int = SUBSTEPS,
         slope: float = 0.0,
+        prints: PrintedGround | None = None,
     ):
         require(
             model.nv > 0, "nothing in the model can move", because="it has no joints"
@@ -115,6 +122,11 @@ class Multibody:
         self.unsolved = self.iterations = 0
         self._bed = bed_under(model, surfaces, grains)
         self._row = NO_ROW
+        self._prints = prints
+        self.memory: Memory | None = None
+        if prints:
+            self._limbs = _limbs(model, self.facets)
+            self.memory = Memory.undisturbed(len(self._limbs))
 
         # The structure of `qDeriv`, which older versions of MuJoCo keep in the data.
         structure = model if hasattr(model, "D_rownnz") else self.data
@@ -159,12 +171,16 @@ class Multibody:
         numbers = np.zeros(mujoco.mj_stateSize(self.model, STATE))
         mujoco.mj_getState(self.model, self.data, numbers, STATE)
         sums = map(float, (self.work, self.loss, self.residual, self.defect))
-        return (numbers, *sums, self.unsolved, self.iterations)
+        counts = (self.unsolved, self.iterations)
+        memory = () if self.memory is None else (self.memory,)
+        return (numbers, *sums, *counts, *memory)
 
     def restore(self, state: tuple) -> None:
         """Set the body to a `state`."""
-        numbers, self.work, self.loss, self.residual, self.defect, *counts = state
-        self.unsolved, self.iterations = counts
+        numbers, self.work, self.loss, self.residual, self.defect, *rest = state
+        self.unsolved, self.iterations, *memory = rest
+        if memory:
+            self.memory = Memory(*memory[0])
         mujoco.mj_setState(self.model, self.data, numbers, STATE)
         self.update()
 
@@ -192,6 +208,8 @@ class Multibody:
 
     def _step(self, h: float, rate_time: float | None) -> None:
         """Take a time step in the sand."""
+        if self._prints:
+            self._meet_prints()
         model = self.model
         data = self.data
         begin = data.time
@@ -219,6 +237,22 @@ class Multibody:
         )
         self.update()
         self._count(before, dt)
+
+    def _meet_prints(self) -> None:
+        """Let limbs meet the prints where they are, and remember these places."""
+        assert self._prints is not None
+        assert self.memory is not None
+        places = self.data.xpos
+        turns = self.data.xmat.reshape(-1, 3, 3)
+        limbs = []
+        for body, middles, areas in self._limbs:
+            world = middles @ turns[body].T + places[body]
+            limbs.append(Limb(world[:, :2], -world[:, 2], areas))
+        shares, self.memory = meet(self._prints, self.memory, limbs)
+        of_bodies = {limb[0]: share for limb, share in zip(self._limbs, shares)}
+        self._bed.blocks.set_shares(
+            np.array([of_bodies.get(int(b), 1.0) for b in self._bed.geoms.bodies])
+        )
 
     def _add_work(self, before: np.ndarray, dt: float) -> None:
         """Add what forces have done in a step of MuJoCo, dt, from velocities ``before``
@@ -253,6 +287,22 @@ class Multibody:
         self.defect += unsolved * now.residual * speed
         if now.residual > before.residual:
             self.residual = max(self.residual, now.residual * speed)
+
+
+def _limbs(
+    model: mujoco.MjModel, facets: Facets
+) -> list[tuple[int, np.ndarray, np.ndarray]]:
+    """Return the bodies but roots of all surfaces, with the middles (n, 3), m, of their
+    triangles in their frames, and the areas (n,), m^2."""
+    found = []
+    for k, body in enumerate(facets.bodies):
+        if model.body_rootid[body] == body:
+            continue
+        corners = facets.corners[facets.owner == k]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        areas = np.linalg.norm(normals, axis=1) / 2
+        found.append((int(body), corners.mean(1), areas))
+    return found
 
 
 def bed_under(
