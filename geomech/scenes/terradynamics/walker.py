@@ -26,7 +26,6 @@ from rft.terradynamics.walking import (
     Walker,
 )
 
-ATTACH = "use rft.mujoco.attach(model, medium, {} = ...) in your own loop"
 SLOPE = 'add [[effects]] with kind = "slope" and its angle'
 KINDS = {kind: effect for kind, effect in GROUND_EFFECTS.items() if effect.walks}
 KINDS[PrintedGround.kind] = PrintedGround
@@ -70,7 +69,7 @@ class WalkerScene:
         ),
     ]
     gait: Annotated[Tripod, Keys(Tripod, owner=OWNER)]
-    effects: Annotated[tuple[GroundEffect, ...], Each(KINDS, elsewhere=ELSEWHERE)] = ()
+    effects: Annotated[tuple[GroundEffect, ...], Each(KINDS)] = ()
     numerics: Annotated[Fineness, Keys(Fineness, owner=OWNER)] = field(
         default_factory=Fineness
     )
