@@ -6,7 +6,6 @@ parameters, are classes below `Swimmer`; `Swimmer.capability` returns them."""
 from __future__ import annotations
 
 import dataclasses
-import warnings
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
@@ -45,6 +44,7 @@ from rft.bodies.base import (
 )
 from rft.bodies.pieces import PIECES, subdivide
 from rft.core.checks import unmasked
+from rft.core.notes import warn
 from rft.core.premise import SHAPE_ALONE, Premise
 from rft.core.refusal import Refusal, located
 from rft.effects import EFFECTS
@@ -665,11 +665,10 @@ def note_radius(swimmer: Swimmer) -> None:
         if has_links:
             link = min(links) if radius > min(links) else max(links)
             whole = f"a link of {size * link:.3g} {unit}"
-        warnings.warn(
+        warn(
             f"end-caps have a radius of {size * radius:.3g} {unit} on {whole}: is the "
             "radius in another unit?",
             UnitWarning,
-            stacklevel=4,
         )
 
 
