@@ -68,6 +68,63 @@ def trial_of(t, points, name="trial.csv"):
     return Trial(name, t, points, tuple(str(k + 1) for k in range(count)), lines, "BL")
 
 
+def sampled_cycles(seed, spread, noise, count=8, n_quantities=4):
+    """Cycles that vary by ``spread`` about 0, measured with noise."""
+    rng = np.random.default_rng(seed)
+    cycles = spread * rng.normal(size=(count, n_quantities))
+    measured = cycles + noise * rng.normal(size=cycles.shape)
+    noisy = measured + noise * rng.normal(size=(40, *cycles.shape))
+    no_change = np.zeros(n_quantities)
+    return intervals.Sample(
+        measured.mean(0), measured, noisy.mean(1), noisy, no_change, noisy[:, 0] * 0
+    )
+
+
+@pytest.mark.parametrize(
+    ("spread", "noise", "least", "largest"),
+    # Half widths over those of the true variance of the mean.
+    [(0.0, 1.0, 1.0, 1.1), (1.0, 0.1, 1.35, 1.55), (1.0, 1.0, 1.15, 1.35)],
+)
+def test_intervals_of_cycles_cover_their_mean_and_are_hardly_wider(
+    spread, noise, least, largest
+):
+    level = 0.9
+    found = [
+        intervals.intervals(sampled_cycles(seed, spread, noise), level)
+        for seed in range(100)
+    ]
+    half_width = np.array([x.half_width for x in found])
+    is_covered = np.abs([x.value for x in found]) < half_width
+    assert level - 0.03 < is_covered.mean() < level + 0.08
+    usual = 1.645 * np.hypot(spread, noise) / 8**0.5
+    assert least * usual < half_width.mean() < largest * usual
+    parts = [np.hypot(x.cycles, np.hypot(x.noise, x.smoothing)) for x in found]
+    np.testing.assert_allclose(half_width, 1.6448536 * np.array(parts), rtol=1e-6)
+
+
+def test_the_error_of_one_cycle_is_its_noise_and_what_smoothing_cuts_off():
+    """Of noise of variance 1 about a bias of 1, and of a change of 3 by smoothing
+    which noise makes 2 +- 1."""
+    noisy = np.array([[10.0], [11.0], [12.0]])
+    sample = intervals.Sample(
+        value=np.array([10.0]),
+        pseudo=np.array([[10.0]]),
+        noisy=noisy,
+        noisy_pseudo=noisy[:, None],
+        change=np.array([3.0]),
+        noisy_change=noisy - 9.0,
+    )
+    found = intervals.intervals(sample, 0.95)
+    noise = 1.0 + intervals.UNSURE**2
+    smoothing = (2 * 3 - 2) ** 2 - 1.0
+    assert found.value == 9.0
+    assert found.noise**2 == pytest.approx(noise)
+    assert found.smoothing**2 == pytest.approx(smoothing)
+    half_width = 1.959964 * (noise + smoothing) ** 0.5
+    assert found.half_width == pytest.approx(half_width)
+    assert found.cycles == pytest.approx(0.0)
+
+
 @pytest.fixture(scope="module")
 def exact():
     """A trial without noise: 3.3 cycles that repeat."""
