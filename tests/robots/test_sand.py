@@ -548,6 +548,22 @@ def test_a_heap_slides_to_the_angle_of_repose_wherever_it_is(place):
     assert memory.head[footprints.BOX + 1] == 0.0  # nothing slides any more
 
 
+def test_a_heap_slides_to_all_sides_alike():
+    """Its centre stays within a hundredth of a cell."""
+    prints = footprints.Footprints(0.1, 1.1, 1.1)
+    size = footprints.HEAD + footprints.PER_GEOM + footprints.PER_CELL * 121
+    memory = footprints.memory_of(np.zeros(size), 1, *prints.shape)
+    memory.ground[5, 5] = 0.3
+    footprints.extend_box(memory.head[footprints.BOX :], 5, 5, 1, *prints.shape)
+    for step in range(1000):
+        memory.head[footprints.STAMP] = step
+        passed = 0.02 * prints.grid[4]
+        footprints.slide(memory, prints.grid, np.zeros(prints.shape), passed)
+    place = np.arange(11) - 5
+    centre = [place @ memory.ground.sum(1), place @ memory.ground.sum(0)]
+    np.testing.assert_allclose(centre, 0.0, atol=0.01 * 0.3)
+
+
 def test_a_point_of_a_geom_moves_as_its_twist_says():
     rng = np.random.default_rng(2)
     twist = rng.normal(size=6)
