@@ -1,5 +1,5 @@
 """Counted beforehand: the force balances of every tier, table, error, motion and sweep
-are those that are solved."""
+are those that are solved, and a search solves no more."""
 
 import dataclasses
 import tracemalloc
@@ -19,6 +19,7 @@ from geomech.runs.cost import BASE
 from geomech.scenes import Scene
 from geomech.studies.estimates import cost, effort
 from geomech.studies.mechanics import motion
+from geomech.studies.optimisation import build_request, search
 from geomech.studies.scene_tables import SceneTables
 from rft import Backbone, Chain, Viscous
 from rft.balance.listening import listening
@@ -109,6 +110,15 @@ def test_a_plan_takes_its_balances(scene, tier, solved):
     solved.clear()
     tables.poses(tier, amplitudes=amplitudes)
     assert cost.n_balances(plan, 2, 32) == sum(solved)
+
+
+@pytest.mark.parametrize(("scene", "starts"), [(GLASS, 2), (VISCOUS, 1)])
+def test_a_search_takes_at_most_the_balances_foretold(scene, starts, solved):
+    few = scene.with_numerics(grid=7, phases=32)
+    request = build_request(few, "displacement", harmonics=1, starts=starts)
+    foretold = request.cost().balances
+    search(request)
+    assert sum(solved) <= foretold <= 20 * sum(solved)
 
 
 @pytest.mark.parametrize("scene", [GLASS, SKIN, STEPS])
