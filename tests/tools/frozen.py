@@ -37,6 +37,7 @@ from unittest import mock
 
 import commands
 import numpy as np
+from refusals import facts
 from words import (
     TOLERANCE,
     WORD,
@@ -175,10 +176,8 @@ def differs(old: list[str], new: list[str]) -> str:
 
 # refusals.txt: under [a command, and the file that is changed] what is done to that,
 # under [geomech] whole commands, under [python] expressions; each with how it ends,
-# what its message names, which FACTS a `Refusal` has, and "cure" where other words of
+# what its message names, which facts a `Refusal` has, and "cure" where other words of
 # it say what to do.
-
-FACTS = ("where", "value", "because", "instead")
 
 CURES = """did you mean|must|such as|possible|takes?|use|give|say|add|put|write|raise
 |lower|widen|leave|drop|keep|choose|name|close|check|install|wait|start|turn|split|end
@@ -268,17 +267,6 @@ class Refused(NamedTuple):
             return True
         after_place = self.message.partition(": ")[2] or self.message
         return bool(CURE.search(after_place))
-
-
-def facts(refusal: Refusal) -> list[str]:
-    """Return which facts a refusal has beside what is wrong."""
-    given = {
-        "where": bool(refusal.where),
-        "value": refusal.value is not ...,
-        "because": bool(refusal.because),
-        "instead": bool(refusal.instead),
-    }
-    return [fact for fact in FACTS if given[fact]]
 
 
 @contextlib.contextmanager
