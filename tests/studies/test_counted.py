@@ -13,6 +13,7 @@ from geomech.mathematics.systems import Swimmer
 from geomech.mathematics.tiers import TIERS
 from geomech.questions.swimmers.accuracy import Accuracy
 from geomech.questions.swimmers.ccf import Ccf
+from geomech.questions.swimmers.connection import Connection
 from geomech.questions.swimmers.run import Run
 from geomech.questions.swimmers.sweep import Sweep
 from geomech.runs.cost import BASE
@@ -188,6 +189,16 @@ def test_a_question_takes_the_balances_foretold(name, solved):
     foretold = question.cost().balances
     solved.clear()
     question.ask()
+    assert foretold == sum(solved)
+
+
+@pytest.mark.parametrize("name", ["a.nc", "a.mat"])
+def test_a_file_of_a_connection_takes_no_more_balances(name, solved, tmp_path):
+    path = tmp_path / name
+    question = Connection(VISCOUS.with_numerics(**COARSE)).for_files([path], {})
+    foretold = question.cost().balances
+    solved.clear()
+    question.ask().save(path)
     assert foretold == sum(solved)
 
 
