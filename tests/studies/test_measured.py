@@ -283,6 +283,7 @@ def test_every_entry_of_A_and_its_slope_is_the_truth_without_noise(viscous):
     slope = np.subtract(*sides) / 0.1
     np.testing.assert_allclose(slope, (true[1] - true[2]) / 0.1, atol=0.02)  # of 0.2
     np.testing.assert_allclose(f.displacement[0], true_net(f, viscous), atol=3e-5)
+    assert results.fit_result(f)["harmonics"].values == 7
 
 
 def test_where_and_when_a_log_begins_does_not_matter(short):
