@@ -119,6 +119,19 @@ def test_what_no_table_or_tier_reaches_is_refused(make, said):
         make(FLUID.system.velocity)
 
 
+def test_more_harmonics_than_usual_come_nearer_to_the_velocity():
+    """At a shape of the grid, in directions between those of the fit."""
+    errors = []
+    for highest in (15, 45):
+        few = GLASS.with_numerics(grid=7, phases=32, harmonics=highest)
+        series = SceneTables(few).compute_harmonics()
+        alpha = np.array([axis[2] for axis in series.axes])
+        rates = connection.directions(2, 97)
+        truth = GLASS.system.velocity(alpha, rates)
+        errors.append(np.abs(series.velocity(alpha, rates) - truth).max())
+    assert errors[1] < 0.3 * errors[0]
+
+
 # Error estimates.
 
 RANDOM_MEDIA = [
