@@ -198,6 +198,10 @@ def test_every_end_has_its_status_and_no_nan(status):
     (found,) = walk([walker], QUICK, 2)
     assert found.status == status
     assert np.isfinite(walk_numbers(found)).all()
+    lasted = found.t[-1] * walker.gait.frequency
+    assert found.cycles >= lasted - 1e-9
+    if lasted < 2:  # it ended before its time
+        assert found.cycles == pytest.approx(lasted)
     (again,) = rerun([walker], dataclasses.replace(QUICK, steps=12), [found], 2)
     assert math.isfinite(again.speed)
 
