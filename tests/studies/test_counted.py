@@ -11,9 +11,11 @@ from geomech import scenes
 from geomech.mathematics.gaits import Fourier, Wave
 from geomech.mathematics.systems import Swimmer
 from geomech.mathematics.tiers import TIERS
+from geomech.questions.shared.base import Run as AskedRun
 from geomech.questions.swimmers.accuracy import Accuracy
 from geomech.questions.swimmers.ccf import Ccf
 from geomech.questions.swimmers.connection import Connection
+from geomech.questions.swimmers.displacement import Displacement
 from geomech.questions.swimmers.run import Run
 from geomech.questions.swimmers.sweep import Sweep
 from geomech.runs.cost import BASE
@@ -190,6 +192,17 @@ def test_a_question_takes_the_balances_foretold(name, solved):
     solved.clear()
     question.ask()
     assert foretold == sum(solved)
+
+
+def test_what_moving_costs_is_told_and_counted_with_a_tolerance_as_without(solved):
+    options = {"amplitudes": (0.3, 0.6), "effort": True}
+    allowed = []
+    within = Displacement(VISCOUS, tolerance=0.01, **options)
+    found = within.compute(AskedRun(allow=allowed.append))
+    assert sum(solved) <= sum(each.balances for each in allowed)
+    full = Displacement(VISCOUS, tiers=("direct",), **options).ask()
+    for name in ("work", "path_length"):
+        np.testing.assert_array_equal(found[name].values, full[name].values)
 
 
 @pytest.mark.parametrize("name", ["a.nc", "a.mat"])
