@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import difflib
 import math
-import warnings
 from collections.abc import Iterable
 from pathlib import Path
 
-from rft.core.notes import Note
+from rft.core.notes import Note, warn
 from rft.core.refusal import Refusal, formatted, in_line
 
 
@@ -26,13 +25,12 @@ FULL_TURN = 2 * math.pi * (1 + 1e-9)
 def check_angle(name: str, largest: float) -> None:
     """Warn (`UnitWarning`) if an angle in rad is beyond a full turn."""
     if largest > FULL_TURN:
-        warnings.warn(
+        warn(
             f"{name} of {largest:.4g} rad is more than a full turn, 2 pi: if the "
             f"value is in degrees, write {largest:.4g}deg on the command line, use a "
             "key that ends in _deg in a scene, or convert it to "
             f"{math.radians(largest):.4g} rad",
             UnitWarning,
-            stacklevel=3,
         )
 
 

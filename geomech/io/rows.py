@@ -24,7 +24,6 @@ import hashlib
 import itertools
 import math
 import re
-import warnings
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -35,7 +34,7 @@ import numpy as np
 
 from geomech.io import files
 from geomech.io.foreign import refuse_foreign
-from rft.core.notes import Note
+from rft.core.notes import warn
 from rft.core.refusal import Refusal, formatted, located
 
 LARGEST_NUMBER = 1e12
@@ -443,7 +442,7 @@ class Rows:
         ``self.notes``."""
         notes = self.notes if notes is None else notes
         if notes:
-            warnings.warn(f"{self.name}: {'; '.join(notes)}", Note, stacklevel=4)
+            warn(f"{self.name}: {'; '.join(notes)}")
 
 
 def read_header(path: str | Path, largest: int, what: str) -> tuple[str, ...]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pickle
 import time
-import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor
@@ -22,7 +21,7 @@ from geomech.runs.tasks import (
     result_type,
     unpack_outcome,
 )
-from rft.core.notes import Note
+from rft.core.notes import warn
 from rft.core.refusal import Refusal
 
 if TYPE_CHECKING:
@@ -156,11 +155,9 @@ class TaskQueue:
                 instead=cure,
             ) from None
         if error.is_told:
-            warnings.warn(
+            warn(
                 "computed by one process, because others do not know it: "
-                f"{error}: {cure}",
-                Note,
-                stacklevel=7,
+                f"{error}: {cure}"
             )
         self.executor = None
 

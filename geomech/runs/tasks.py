@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 from geomech.runs.backend import VERSION, one_thread, preferring
 from geomech.runs.threads import one_blas_thread
 from geomech.scenes import kinds
+from rft.core.notes import Note, warn
 from rft.core.refusal import Refusal
 
 
@@ -170,7 +171,10 @@ def unpack_outcome(raw: bytes, warned: set) -> Any:
     for text, category, file, line in outcome.notes:
         if (text, category) not in warned:
             warned.add((text, category))
-            warnings.warn_explicit(text, category, file, line)
+            if issubclass(category, Note):  # a worker has no line of the caller
+                warn(text, category)
+            else:
+                warnings.warn_explicit(text, category, file, line)
     if outcome.error is not None:
         raise outcome.error from WorkerTraceback(outcome.traceback)
     return outcome.value

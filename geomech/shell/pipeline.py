@@ -6,7 +6,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +20,7 @@ from geomech.results.lengths import in_lengths
 from geomech.runs.backend import prefer_for
 from geomech.runs.cost import Cost, decide
 from geomech.shell import terminal
-from rft.core.notes import Note
+from rft.core.notes import warn
 from rft.core.refusal import Refusal, in_line, spell_arguments
 
 MORE = "--all prints all variables"
@@ -164,7 +163,7 @@ def note_system(question: Question) -> None:
     if not hasattr(scene, "system"):
         return
     for line in notes(scene.system):
-        warnings.warn(f"{scene.name}: {line}", Note, stacklevel=4)
+        warn(f"{scene.name}: {line}")
 
 
 @contextlib.contextmanager

@@ -5,9 +5,7 @@ The old spellings work until the next version, with a note.
 
 from __future__ import annotations
 
-import warnings
-
-from rft.core.notes import Note
+from rft.core.notes import warn
 
 COMMANDS = {
     "fit": "fit-gait",
@@ -41,10 +39,8 @@ def current_word(word: str, renamed: dict[str, str]) -> str:
     old, equals, value = word.partition("=")
     if old not in renamed:
         return word
-    warnings.warn(
+    warn(
         f"{old} is now {renamed[old]}: the old spelling will be removed in the "
-        "next version",
-        Note,
-        stacklevel=3,
+        "next version"
     )
     return f"{renamed[old]}{equals}{value}"

@@ -9,11 +9,10 @@ from __future__ import annotations
 import functools
 import importlib
 import importlib.util
-import warnings
 from collections.abc import Callable
 from types import ModuleType
 
-from rft.core.notes import Note
+from rft.core.notes import warn
 from rft.laws.records import Terms
 
 NAME = "rft.balance._kernels"
@@ -30,11 +29,9 @@ def library() -> ModuleType | None:
         return importlib.import_module(NAME)
     except ImportError as error:
         reason = str(error).splitlines()[0]
-        warnings.warn(
+        warn(
             f"the compiled balances of this wheel do not load: {reason}; slower code "
-            "computes the same: install the wheel for this version of Python",
-            Note,
-            stacklevel=2,
+            "computes the same: install the wheel for this version of Python"
         )
         return None
 

@@ -19,7 +19,6 @@ import re
 import secrets
 import sys
 import types
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +30,7 @@ from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 from numba.misc.appdirs import user_cache_dir
 
-from rft.core.notes import Note
+from rft.core.notes import warn
 from rft.core.refusal import Refusal
 from rft.formulas import simd, vectors
 
@@ -100,7 +99,7 @@ class Cache(_Cache):
             os.replace(part, self.path)
         except OSError as error:
             cure = "free some disk space there, or set NUMBA_CACHE_DIR"
-            note(
+            warn(
                 f"compiled code is not stored in {self.path.parent}: "
                 f"{error.strerror}; {cure}"
             )
@@ -122,7 +121,7 @@ class Cache(_Cache):
                 f"renamed to {other.name}; it is compiled again (at once with python "
                 "-m rft)"
             )
-        note(f"the compiled code in {self.path} is not used because {why}: {action}")
+        warn(f"the compiled code in {self.path} is not used because {why}: {action}")
 
     def enable(self) -> None:
         """Do nothing: the file is always used."""
@@ -198,11 +197,6 @@ def _function_at(source: str, number: int) -> str:
     with contextlib.suppress(SyntaxError):
         visit(ast.parse(source), ())
     return ".".join(names) or "a formula"
-
-
-def note(text: str) -> None:
-    """Warn with a `Note`."""
-    warnings.warn(text, Note, stacklevel=1)
 
 
 def digest(function, *modules) -> str:

@@ -180,7 +180,7 @@ class Effect:
                         where=self.kind,
                         because=f"the body has a length, {length:g} m",
                         instead=f"give {other.name} instead: {largest:.6g} if the "
-                        f"value is in {other.unit}, otherwise {scaled:.6g}",
+                        f"value is {other.unit}, otherwise {scaled:.6g}",
                     )
                 continue
             if length is None:

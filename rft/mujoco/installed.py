@@ -11,7 +11,6 @@ import atexit
 import ctypes
 import functools
 import threading
-import warnings
 import weakref
 from collections import deque
 from typing import NamedTuple
@@ -20,7 +19,7 @@ import mujoco
 import numpy as np
 
 from rft.balance.backend import compiles
-from rft.core.notes import Note
+from rft.core.notes import warn
 from rft.core.refusal import require
 from rft.mujoco import numpy_step
 from rft.mujoco.bed import Bed
@@ -289,11 +288,7 @@ def _python_callback(model: int, data: int) -> None:
                 _add_forces_by_python(row, entry, data)
             except Exception as error:
                 remove(row)
-                warnings.warn(
-                    f"the sand is detached: {type(error).__name__}: {error}",
-                    Note,
-                    stacklevel=2,
-                )
+                warn(f"the sand is detached: {type(error).__name__}: {error}")
 
 
 def _add_forces_by_python(row: int, entry: Entry, data: int) -> None:
@@ -364,7 +359,7 @@ def _warn_changed(bed: Bed, shapes: np.ndarray, before: np.ndarray) -> None:
         f"the sand is detached: the geom {bed.geoms.names[first]} changed after "
         "attach: attach it again"
     )
-    warnings.warn(line, Note, stacklevel=2)
+    warn(line)
 
 
 def _warn_unsolved(time: float, residual: float, geom: str) -> None:
@@ -374,7 +369,7 @@ def _warn_unsolved(time: float, residual: float, geom: str) -> None:
         f"act on {geom}, are out of balance by {100 * residual:.2g} %; sand.effort "
         "counts such steps, and shorter steps are easier"
     )
-    warnings.warn(line, Note, stacklevel=2)
+    warn(line)
 
 
 def layout_of(

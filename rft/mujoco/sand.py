@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 import weakref
 import zlib
 from collections.abc import Mapping, Sequence
@@ -13,7 +12,7 @@ import mujoco
 import numpy as np
 
 from rft.core.checks import in_range
-from rft.core.notes import Note
+from rft.core.notes import warn
 from rft.core.refusal import Refusal, formatted, located, require
 from rft.mujoco import installed
 from rft.mujoco.bed import Bed, Surface
@@ -418,7 +417,7 @@ def attach(
 
     # Before anything is changed: a filter may turn warnings into errors.
     for line in notes:
-        warnings.warn(line, Note, stacklevel=2)
+        warn(line)
     return Sand(model, bed, element, notes, exclusion, hulls)
 
 

@@ -57,7 +57,7 @@ class Motion:
         require(
             abs(self.rate) >= 1e-9,
             "rate must not be 0",
-            because="use drag for a body that does not turn",
+            instead="use drag for a body that does not turn",
         )
         reaches_stop = (self.stop - self.start) * self.rate > 0
         require(

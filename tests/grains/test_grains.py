@@ -10,6 +10,7 @@ import types
 
 import numpy as np
 import pytest
+from refusals import refuses
 
 import rft
 from geomech.questions.grains.grains import Grains
@@ -225,44 +226,46 @@ TOW = Tow(0.1)
 LONG = rod(0.05, 4e-3, through=True)
 FOLDED = dataclasses.replace(CIRCLE, shape=lambda t: np.array([2.9 * np.cos(t), 0.0]))
 REFUSED = [
-    (lambda: Bed(time_step=1.2e-4), "0.24 of the Rayleigh time"),
-    (lambda: Bed(length=0.03, width=0.3), "5.0 grains wide is too small"),
-    (lambda: Bed(friction=-1), "friction must be a number from 0 to 10"),
-    (lambda: Bed(length=10, width=10), "grains are too many"),
-    (lambda: checked(SMALL, rod(0.03, 4e-3), TOW), "too small: 64 mm for a body"),
-    (lambda: checked(SMALL, ROD, TOW, depth=0.01), "too shallow: 31.0 mm below"),
-    (lambda: checked(SMALL, ROD, Stroke(0.1, 0.0, None)), "amplitude must be a number"),
-    (lambda: checked(SMALL, ROD, TOW, sample=0.2), "sample must be a number"),
-    (lambda: checked(SMALL, LONG, TOW), "as long as its bed, 0.064 m"),
-    (lambda: checked(Bed(), ROD, CIRCLE), "2 joint angles, but the body has 0"),
-    (lambda: checked(Bed(), uneven(), FOLDED), "links touch at the shape"),
-    (lambda: rod(0.05, 4e-3, through=True, grain=1e-5), "2e.06 spheres are too many"),
-    (lambda: rod(0.05, 4e-3, "square"), "a square bar has no ends here"),
+    (lambda: Bed(time_step=1.2e-4), "0.00012 s 0.24 Rayleigh | because instead"),
+    (lambda: Bed(length=0.03, width=0.3), "5.0 grains six | instead"),
+    (lambda: Bed(friction=-1), "friction 0 10 -1 | value"),
+    (lambda: Bed(length=10, width=10), "24,143,981 grains | instead"),
+    (lambda: checked(SMALL, rod(0.03, 4e-3), TOW), "64 mm | because instead"),
+    (lambda: checked(SMALL, ROD, TOW, depth=0.01), "31.0 mm | because instead"),
+    (
+        lambda: checked(SMALL, ROD, Stroke(0.1, 0.0, None)),
+        "amplitude 1e-09 1000 m | value",
+    ),
+    (lambda: checked(SMALL, ROD, TOW, sample=0.2), "sample 1e-09 0.2 | value"),
+    (lambda: checked(SMALL, LONG, TOW), "0.05 m 0.064 m"),
+    (lambda: checked(Bed(), ROD, CIRCLE), "2 joint 0 joints"),
+    (lambda: checked(Bed(), uneven(), FOLDED), "links shape | because instead"),
+    (lambda: rod(0.05, 4e-3, through=True, grain=1e-5), "2e+06 grain | instead"),
+    (lambda: rod(0.05, 4e-3, "square"), "square through=True | instead"),
     (
         lambda: chain(rft.Chain((1, 9)), 0.1, 0.02),
-        "links must be longer than their width",
+        "links width | value",
     ),
 ]
 
 
 @pytest.mark.parametrize(("build", "said"), REFUSED, ids=[said for _, said in REFUSED])
 def test_what_cannot_be_is_refused(build, said):
-    with pytest.raises(ValueError, match=said) as refusal:
+    with refuses(said):
         build()
-    assert "\n" not in str(refusal.value)
 
 
 @pytest.mark.parametrize(
     ("folder", "said"),
     [
-        ("file", "File exists; use"),
-        ("für", "does not accept the folder name"),
-        ('a"', "quotes"),
+        ("file", "file exists | because instead"),
+        ("für", "für ASCII | instead"),
+        ('a"', 'a" quotes | instead'),
     ],
 )
 def test_folders_that_keep_no_beds_are_refused(folder, said, tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(ValueError, match=said):
+    with refuses(said):
         experiments.settle(SMALL, ROD, 0.02, tmp_path / folder)
 
 
@@ -286,17 +289,16 @@ def test_a_lammps_without_its_mpi_is_refused_before_anything_is_computed(monkeyp
 @pytest.mark.parametrize(
     ("error", "said"),
     [
-        ("Lost atoms: original 400 current 399", "grains fly off: one left the box"),
+        ("Lost atoms: original 400 current 399", "grains box step | because instead"),
         (
             "Unknown (a.cpp:1)\n command",
-            r"LAMMPS stopped: ERROR: Unknown \(a.cpp:1\) c",
+            "LAMMPS Unknown (a.cpp:1) command | because",
         ),
     ],
 )
 def test_errors_of_lammps_are_told_on_one_line(error, said):
-    with pytest.raises(ValueError, match=said) as told, refuse_lammps_errors():
+    with refuses(said), refuse_lammps_errors():
         raise Exception(f"ERROR: {error}")
-    assert "\n" not in str(told.value)
 
 
 # In LAMMPS, some 400 grains.
@@ -394,16 +396,16 @@ WALLED = dataclasses.replace(SMALL, walled=True)
 @pytest.mark.parametrize(
     ("bed", "tow", "said"),
     [
-        (WALLED, Tow(0.4, 0.0), r"at 0\.\d+ s the body leaves the bed"),
+        (WALLED, Tow(0.4, 0.0), "s body bed | instead"),
         (
             SMALL,
             Tow(1.0),
-            r"moves 0\.0\d+ grain diameters per step: .* move it more slowly",
+            "grain diameters step | because instead",
         ),
     ],
 )
 def test_bodies_that_leave_or_move_too_fast_are_refused(bed, tow, said, store):
-    with pytest.raises(ValueError, match=said):
+    with refuses(said):
         Experiment(bed, ROD, tow, 0.1).run(store)
 
 

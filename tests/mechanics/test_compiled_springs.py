@@ -196,3 +196,21 @@ def test_other_bodies_and_effects_are_left_to_numpy(monkeypatch):
         SAND, Chain(), alpha, alphadot, effects=effects, backend="numba", cycles=1
     )
     assert found.residual <= 1e-9
+
+
+def test_linear_equations_are_solved_and_have_no_solution_where_singular():
+    """The determinant has its sign; without a solution the numbers are 0."""
+    joints = pytest.importorskip("rft.balance.joints")
+    rng = np.random.default_rng(1)
+    for size in (1, 3, 6):
+        matrix, right = rng.normal(size=(size, size)), rng.normal(size=size)
+        x = right.copy()
+        sign = joints.solve_linear(matrix.copy(), x)
+        np.testing.assert_allclose(x, np.linalg.solve(matrix, right), rtol=1e-9)
+        assert sign == np.sign(np.linalg.det(matrix))
+        for wrong in (0.0, np.nan):
+            without = matrix.copy()
+            without[0] = wrong
+            x = right.copy()
+            assert joints.solve_linear(without, x) == 0.0
+            np.testing.assert_array_equal(x, np.zeros(size))

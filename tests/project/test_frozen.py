@@ -60,9 +60,10 @@ def test_a_script_without_a_guard_runs_once_and_on_two_workers():
 @pytest.mark.parametrize(
     ("recorded", "how"),
     [
-        ('2 ["plain.toml", "[gait]", "kind", "circel", "circle"] cure', ""),
-        ('0 ["plain.toml"] cure', "ends with 2 in place of 0"),
-        ('2 ["plane.toml", "circel"] cure', "does not name plane.toml"),
+        ('2 ["plain.toml", "[gait]", "kind", "circel", "circle"] where instead', ""),
+        ('0 ["plain.toml"] where instead', "ends with 2 in place of 0"),
+        ('2 ["plane.toml", "circel"] where instead', "does not name plane.toml"),
+        ('2 ["plain.toml", "circel"] where because instead', "tells"),
         ('2 ["plain.toml", "tilt", "7"]', "does not name tilt, 7"),
     ],
 )

@@ -5,21 +5,23 @@ import math
 import re
 import warnings
 
+import frozen
 import numpy as np
 import pytest
 from commands import geomech
 from registry import MEDIA
 
-from geomech import load_result, scenes
+from geomech import fit_gait, fit_medium, load_result, scenes, velocity
 from geomech.core.errors import UnitWarning, VelocityWarning
-from geomech.mathematics.gaits import Circle, Ellipse, Sine
+from geomech.mathematics.gaits import Circle, Ellipse, Points, Sine
 from geomech.mathematics.geometry import connection
 from geomech.mathematics.systems import NoSlipSnake, Swimmer
 from geomech.scenes import Scene
 from geomech.studies.displacement.choose import cheapest_displacements
 from geomech.studies.mechanics.single import diagnosed_velocity as single_of
 from geomech.studies.scene_tables import SceneTables
-from rft import Backbone, Chain, Serpenoid, Viscous
+from rft import Backbone, Chain, EndCaps, Serpenoid, Viscous
+from rft.terradynamics.meshes import MeshFile
 
 pytestmark = pytest.mark.usefixtures("fastest")
 VISCOUS, GLASS = scenes.load("three-link-viscous"), MEDIA["glass-0.3mm-loose"]
@@ -145,6 +147,39 @@ def test_a_gait_off_the_field_is_refused_by_every_command_alike(gait, tmp_path):
 
 
 AXES = connection.grid(2, 5, 1.0)
+CORNERS = (0, 0), (2, 0), (2, 0.02), (0, 0.02)
+# Calls that warn, in a copy of data/frozen with the files of `warned_of`.
+WARNING = [
+    lambda: Scene(VISCOUS.system, Circle(amplitude=30)),
+    lambda: Scene(VISCOUS.system, Points(CORNERS)),
+    lambda: Scene(Swimmer(GLASS, Chain(), [EndCaps(0.5)]), Circle()),
+    lambda: connection.fit(lambda a, r: [1.0, 2.0, 3.0], AXES),
+    lambda: scenes.load("small.toml"),
+    lambda: scenes.load("fast.toml"),
+    lambda: MeshFile("wedge.stl", scale=0.1),
+    lambda: fit_gait("trial.csv"),
+    lambda: fit_gait("log.csv", degrees=True),
+    lambda: fit_medium("push.csv"),
+    lambda: velocity(VISCOUS, alpha=(30, 0), alphadot=(1, 0)),
+]
+
+
+def write_files_that_are_warned_of(folder):
+    (folder / "small.toml").write_text(PLAIN.replace("13.8", "0.24"))
+    snake = (folder / "snake.toml").read_text()
+    (folder / "fast.toml").write_text(snake.replace("[gait]", "[gait]\nfrequency = 9"))
+    rows = (folder / "push.csv").read_text().replace(",", ";")
+    (folder / "push.csv").write_text(rows)
+
+
+@pytest.mark.parametrize("call", WARNING)
+def test_a_warning_points_at_the_line_of_the_caller(call):
+    with frozen.place() as folder, warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        write_files_that_are_warned_of(folder)
+        call()
+    place = __file__, call.__code__.co_firstlineno
+    assert {(x.filename, x.lineno) for x in told} == {place}
 
 
 def turning(alpha, alphadot):

@@ -8,8 +8,8 @@ import pickle
 
 import numpy as np
 import pytest
+from refusals import refuses
 from registry import GAITS, OUTLINES, STRESSES, SYSTEMS
-from words import in_order
 
 import geomech
 import rft
@@ -420,25 +420,28 @@ def assert_refused(call, name):
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda: scenes.load(3), "scene TOML 3"),
-        (lambda: PLAIN.with_numerics(grid="a"), "three-link-viscous grid"),
-        (lambda: Chain(length="x"), "length 1e-15 1e+15 m"),
-        (lambda: Chain(lengths=[[1]]), "lengths [[1]]"),
+        (lambda: scenes.load(3), "scene TOML 3 | value"),
+        (
+            lambda: PLAIN.with_numerics(grid="a"),
+            "three-link-viscous grid | where value",
+        ),
+        (lambda: Chain(length="x"), "length 1e-15 1e+15 m | value"),
+        (lambda: Chain(lengths=[[1]]), "lengths [[1]] | value"),
         (
             lambda: body_velocity("sand", Chain(), STILL, STILL),
-            "medium force",
+            "medium force | value",
         ),
-        (lambda: Swimmer(lambda v: v, Chain()), "medium force law"),
-        (lambda: PLAIN.changed(gait=[1, 2]), "gait Circle"),
-        (lambda: direct(len, [1, 2]), "gait"),
+        (lambda: Swimmer(lambda v: v, Chain()), "medium force law | value"),
+        (lambda: PLAIN.changed(gait=[1, 2]), "gait Circle | where value"),
+        (lambda: direct(len, [1, 2]), "gait | value"),
         (
             lambda: Swimmer(Coulomb(), Chain(), effects=["caps"]),
-            "effects list of effects",
+            "effects list of effects | value",
         ),
     ],
 )
 def test_the_place_is_named(call, said):
-    with pytest.raises(Refusal, match=in_order(said)):
+    with refuses(said):
         call()
 
 

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from geomech import scenes
 from geomech.scenes import WalkerScene
+from geomech.studies.terradynamics.walking import view as view_of
 from geomech.studies.terradynamics.walking import walked
 from rft.balance import backend
 from rft.core.metres import GRAVITY
@@ -255,6 +256,16 @@ def test_the_means_of_a_walk_are_those_of_its_last_strides(
     found = Simulation.means(robot, rows, strides, periodic, 0.03, end)
     means = pytest.approx(velocity, abs=1e-6), pytest.approx(spread), status
     assert found == means
+
+
+def test_a_view_of_a_hexapod_has_a_hull_and_two_tripods():
+    """Which have as many triangles, and lie below it."""
+    view = view_of(XPLORER)
+    triangles = view.triangles(view.machine.model.qpos0)
+    assert len(triangles) == len(view.groups)
+    hull, one, other = (triangles[view.groups == k].mean((0, 1)) for k in range(3))
+    assert np.count_nonzero(view.groups == 1) == np.count_nonzero(view.groups == 2)
+    assert one[2] == pytest.approx(other[2]) and one[2] < hull[2]
 
 
 def test_a_row_tells_place_attitude_and_their_rates():

@@ -389,10 +389,12 @@ def test_a_geom_that_changes_stops_the_sand_with_a_line(solved_by):
     model = model_of(free(0.0, '<geom name="ball" type="sphere" size="0.03"/>'), 0.002)
     data = mujoco.MjData(model)
     with rft.mujoco.attach(model, StressMap(zeta=0.3)) as sand:
-        mujoco.mj_step(model, data)
+        mujoco.mj_step(model, data, 3)
+        assert sand.effort.steps == 3
         model.geom_size[0, 0] = 0.05
-        with pytest.warns(Note, match="the geom 'ball' changed after attach"):
+        with pytest.warns(Note, match="'ball'") as told:
             mujoco.mj_step(model, data, 3)
+        assert [x.filename for x in told] == [__file__]
         assert not sand.is_attached
 
 

@@ -1,5 +1,7 @@
-"""How far a computation is: lines in a pipe, a bar in a notebook."""
+"""How far a computation is: lines in a pipe, a bar in a notebook or on a terminal."""
 
+import io
+import re
 import sys
 import time
 from types import SimpleNamespace
@@ -47,3 +49,23 @@ def test_a_bar_in_a_notebook(monkeypatch, capsys):
     assert shown[0].startswith(f"{bar} field of &lt;x&gt;: 25 % after 0 s")
     assert shown[-1].endswith("field of &lt;x&gt;: done in 0 s")
     assert capsys.readouterr().err == ""
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def test_a_bar_on_a_terminal_shows_what_is_done_and_is_gone_at_the_end(
+    monkeypatch, capsys
+):
+    terminal_of_user = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal_of_user)
+    monkeypatch.setenv("TERM", "xterm")
+    with progress.progress("field of <x>") as report:
+        report(0.25)
+    written = terminal_of_user.getvalue()
+    *_, last_drawn = re.findall(r"field of <x>.*? (\d+)%", written)
+    assert last_drawn == "25"
+    assert written.endswith("\x1b[2K")  # the line is erased
+    assert capsys.readouterr().out == ""

@@ -5,6 +5,8 @@ import contextlib
 import itertools
 import os
 import signal
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -155,6 +157,31 @@ def test_the_end_of_a_pool_ends_its_tasks(tmp_path):
         assert not worker.is_alive()
     assert executor.pool is None
     executor.close()
+
+
+KILLED = """
+import os, signal
+from geomech.runs.executors import Processes
+
+if __name__ == "__main__":
+    print(Processes(1).submit(abs, -1).result(), flush=True)
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.timeout(60)
+def test_a_killed_program_leaves_no_worker_and_no_words(tmp_path):
+    """Its standard error closes only once all of its processes have ended."""
+    (tmp_path / "killed.py").write_text(KILLED)
+    ended = subprocess.run(
+        [sys.executable, "killed.py"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        capture_output=True,
+        text=True,
+    )
+    told = (ended.returncode, ended.stdout, ended.stderr)
+    assert told == (-signal.SIGKILL, "1\n", "")
 
 
 @pytest.mark.timeout(20)

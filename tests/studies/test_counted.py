@@ -1,5 +1,5 @@
 """Counted beforehand: the force balances of every tier, table, error, motion and sweep
-are those that are solved."""
+are those that are solved, and a search solves no more."""
 
 import dataclasses
 import tracemalloc
@@ -11,14 +11,18 @@ from geomech import scenes
 from geomech.mathematics.gaits import Fourier, Wave
 from geomech.mathematics.systems import Swimmer
 from geomech.mathematics.tiers import TIERS
+from geomech.questions.shared.base import Run as AskedRun
 from geomech.questions.swimmers.accuracy import Accuracy
 from geomech.questions.swimmers.ccf import Ccf
+from geomech.questions.swimmers.connection import Connection
+from geomech.questions.swimmers.displacement import Displacement
 from geomech.questions.swimmers.run import Run
 from geomech.questions.swimmers.sweep import Sweep
 from geomech.runs.cost import BASE
 from geomech.scenes import Scene
 from geomech.studies.estimates import cost, effort
 from geomech.studies.mechanics import motion
+from geomech.studies.optimisation import build_request, search
 from geomech.studies.scene_tables import SceneTables
 from rft import Backbone, Chain, Viscous
 from rft.balance.listening import listening
@@ -111,6 +115,15 @@ def test_a_plan_takes_its_balances(scene, tier, solved):
     assert cost.n_balances(plan, 2, 32) == sum(solved)
 
 
+@pytest.mark.parametrize(("scene", "starts"), [(GLASS, 2), (VISCOUS, 1)])
+def test_a_search_takes_at_most_the_balances_foretold(scene, starts, solved):
+    few = scene.with_numerics(grid=7, phases=32)
+    request = build_request(few, "displacement", harmonics=1, starts=starts)
+    foretold = request.cost().balances
+    search(request)
+    assert sum(solved) <= foretold <= 20 * sum(solved)
+
+
 @pytest.mark.parametrize("scene", [GLASS, SKIN, STEPS])
 def test_what_moving_costs_takes_the_balances_foretold(scene, solved):
     foretold = cost.total_cost(cost.effort_jobs(scene, 3)).balances
@@ -178,6 +191,27 @@ def test_a_question_takes_the_balances_foretold(name, solved):
     foretold = question.cost().balances
     solved.clear()
     question.ask()
+    assert foretold == sum(solved)
+
+
+def test_what_moving_costs_is_told_and_counted_with_a_tolerance_as_without(solved):
+    options = {"amplitudes": (0.3, 0.6), "effort": True}
+    allowed = []
+    within = Displacement(VISCOUS, tolerance=0.01, **options)
+    found = within.compute(AskedRun(allow=allowed.append))
+    assert sum(solved) <= sum(each.balances for each in allowed)
+    full = Displacement(VISCOUS, tiers=("direct",), **options).ask()
+    for name in ("work", "path_length"):
+        np.testing.assert_array_equal(found[name].values, full[name].values)
+
+
+@pytest.mark.parametrize("name", ["a.nc", "a.mat"])
+def test_a_file_of_a_connection_takes_no_more_balances(name, solved, tmp_path):
+    path = tmp_path / name
+    question = Connection(VISCOUS.with_numerics(**COARSE)).for_files([path], {})
+    foretold = question.cost().balances
+    solved.clear()
+    question.ask().save(path)
     assert foretold == sum(solved)
 
 

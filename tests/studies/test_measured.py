@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import xarray
 from commands import geomech as command
+from refusals import refuses
 from scipy.interpolate import CubicSpline
 from scipy.io import netcdf_file
 from scipy.signal import lfilter
@@ -282,6 +283,7 @@ def test_every_entry_of_A_and_its_slope_is_the_truth_without_noise(viscous):
     slope = np.subtract(*sides) / 0.1
     np.testing.assert_allclose(slope, (true[1] - true[2]) / 0.1, atol=0.02)  # of 0.2
     np.testing.assert_allclose(f.displacement[0], true_net(f, viscous), atol=3e-5)
+    assert results.fit_result(f)["harmonics"].values == 7
 
 
 def test_where_and_when_a_log_begins_does_not_matter(short):
@@ -577,11 +579,11 @@ def test_a_field_whose_grid_the_data_miss_has_errors_along_its_gait(
 
 def test_what_the_data_do_not_reach_is_refused(field):
     scene = load(field / "mine.toml")
-    with refused(in_order("alpha 0.2 -0.1")):
+    with refuses("alpha 0.2 -0.1 | instead"):
         scene.system.velocity(np.array([0.2, -0.1]), np.array([1.0, 0.0]))
-    with refused(in_order("area tier A mean gait")):
+    with refuses("area tier A mean gait | where instead"):
         SceneTables(scene).poses("area")
-    with refused(in_order("one gait")):
+    with refuses("one gait | where because instead"):
         optimise(scene, "displacement")
 
 
@@ -610,30 +612,30 @@ def test_lengths_and_signs_of_a_field(usual, field):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda d: d.drop_vars("gait_slope"), "gait_slope"),
+        (lambda d: d.drop_vars("gait_slope"), "gait_slope | instead"),
         (
             lambda d: d.assign(gait_beyond=d.gait_beyond.expand_dims("more")),
-            "gait_beyond",
+            "gait_beyond | instead",
         ),
         (
             lambda d: d.assign(gait_spread=d.gait_spread * (2 * d.joint - 3)),
-            "gait parts",
+            "gait parts | instead",
         ),
-        (lambda d: d.isel(normal=[0, 0]), "gait parts"),
-        (lambda d: d.isel({d.gait_A.dims[-1]: slice(1, None)}), "gait parts"),
-        (lambda d: d.isel(along_and_across=[0, 1, 1]), "gait parts"),
-        (lambda d: d.assign_attrs(level=1.0), "gait parts"),
-        (lambda d: d.assign_attrs(level=b"most"), "gait parts"),
-        (lambda d: d.assign_attrs(error_factor=0.0), "gait parts"),
-        (lambda d: d.assign_attrs(error_factor=1e6), "gait parts"),
-        (lambda d: d.assign_attrs(error_factor=[2.0, 2.0]), "gait parts"),
-        (lambda d: d.assign(gait=0 * d.gait), "gait move"),
+        (lambda d: d.isel(normal=[0, 0]), "gait parts | instead"),
+        (lambda d: d.isel({d.gait_A.dims[-1]: slice(1, None)}), "gait parts | instead"),
+        (lambda d: d.isel(along_and_across=[0, 1, 1]), "gait parts | instead"),
+        (lambda d: d.assign_attrs(level=1.0), "gait parts | instead"),
+        (lambda d: d.assign_attrs(level=b"most"), "gait parts | instead"),
+        (lambda d: d.assign_attrs(error_factor=0.0), "gait parts | instead"),
+        (lambda d: d.assign_attrs(error_factor=1e6), "gait parts | instead"),
+        (lambda d: d.assign_attrs(error_factor=[2.0, 2.0]), "gait parts | instead"),
+        (lambda d: d.assign(gait=0 * d.gait), "gait move | instead"),
     ],
 )
 def test_parts_of_a_gait_that_do_not_fit_are_refused(change, said, field, tmp_path):
     with xarray.open_dataset(field / "field.nc", engine="scipy") as data:
         change(data).to_netcdf(tmp_path / "bad.nc", engine="scipy")
-    with refused(in_order(said)):
+    with refuses(said):
         tables.load(tmp_path / "bad.nc")
 
 
@@ -678,78 +680,78 @@ def late(rows):
     [
         (
             lambda r: np.delete(r, slice(100, 120), 0),
-            "line 101 rows 0.7 gap",
+            "line 101 rows 0.7 gap | where instead",
         ),
         (
             lambda r: np.delete(r, [*range(100, 120), *range(220, 230)], 0),
-            "line 101 2 gaps",
+            "line 101 2 gaps | where instead",
         ),
         (
             lambda r: r[: 9 * 30 + 15],
-            "7 full cycles few 10",
+            "7 full cycles few 10 | where instead",
         ),
         (
             lambda r: r[[*range(100), 101, 100, *range(102, 300)]],
-            "line 103 t = rows time",
+            "line 103 t = rows time | where instead",
         ),
         (
             changed(0, lambda r: r[0, 0], slice(99, 101)),
-            "line 102 t = twice",
+            "line 102 t = twice | where instead",
         ),
         (
             changed(5, lambda r: np.degrees(r[:, 5]) % 360),
-            "line 3 heading jumps 359.3 full degrees degrees",
+            "line 3 heading jumps 359.3 full degrees degrees | where instead",
         ),
         (
             changed(2, lambda r: 0.3 - 0.5 * r[:, 1] + noise(r)),
-            "alpha_2 -0.5 times alpha_1 constant noise",
+            "alpha_2 -0.5 times alpha_1 constant noise | where because instead",
         ),
         (
             changed(2, lambda r: 0.2 + noise(r)),
-            "alpha_2 move noise columns",
+            "alpha_2 move noise columns | where instead",
         ),
         (
             changed(2, lambda r: r[:, 0] / 14 + noise(r)),
-            "alpha_2 drifts 0.1 0.8",
+            "alpha_2 drifts 0.1 0.8 | where because instead",
         ),
         (
             changed(slice(3, 5), lambda r: 1e12 * r[:, 3:5]),
-            "A reach x y body",
+            "A reach x y body | where instead",
         ),
-        (changed(2, lambda r: 0.4), "alpha_2 move"),
-        (changed(slice(3, 6), lambda r: 0.0), "x y heading move"),
+        (changed(2, lambda r: 0.4), "alpha_2 move | where instead"),
+        (changed(slice(3, 6), lambda r: 0.0), "x y heading move | where because"),
         (
             changed(4, lambda r: np.nan, [77]),
-            "line 79 row column y row",
+            "line 79 row column y row | where value instead",
         ),
         (
             lambda r: r[: 8 * 30 + 15],
-            "joints repeat 8. times 10 cycles",
+            "joints repeat 8. times 10 cycles | where instead",
         ),
-        (lambda r: r[::4], "7.6 rows cycle few 12"),
+        (lambda r: r[::4], "7.6 rows cycle few 12 | where instead"),
         (
             changed(3, lambda r: r[:, 3] + 1, [200]),
-            "line 202 x differs",
+            "line 202 x differs | where instead",
         ),
         (
             changed(4, lambda r: r[:, 4] - 1, slice(202, None)),
-            "line 204 y jumps -1 row",
+            "line 204 y jumps -1 row | where because instead",
         ),
         (
             changed(0, lambda r: 1e-9 * r[:, 0]),
-            "joints repeat t s",
+            "joints repeat t s | where instead",
         ),
         (
             changed(0, lambda r: 100 + r[:, 0] + 0.3 * late(r)),
-            "joints repeat 1.01 1.28 last two",
+            "joints repeat 1.01 1.28 last two | where because instead",
         ),
         (
             changed(0, lambda r: r[:, 0] + late(r)),
-            "line 33 gait pauses",
+            "line 33 gait pauses | where instead",
         ),
         (
             changed(1, lambda r: 0.4 * r[:, 1] - 1, slice(200, None)),
-            "line 202 alpha_1 jumps two gaits",
+            "line 202 alpha_1 jumps two gaits | where because instead",
         ),
         (
             changed(
@@ -757,15 +759,14 @@ def late(rows):
                 lambda r: 1.25 * r[:, 1:3] - 0.25 * GAIT.middle,
                 slice(205, None),
             ),
-            "line 212 two gaits 6 cycles 6 another = 7",
+            "line 212 two gaits 6 cycles 6 another = 7 | where because instead",
         ),
     ],
 )
 def test_bad_logs_get_one_line(change, said, short, tmp_path):
     path = written(tmp_path / "log.csv", short, change=change)
-    with refused("^log.csv(, |: ).*" + in_order(said)) as caught:
+    with refuses(said, "log.csv"):
         measured.fit_log(path)
-    assert "\n" not in str(caught.value)
 
 
 def columns_of(path, header, rows=120, value=0.0, column=1):
@@ -809,62 +810,62 @@ def test_columns_are_known_by_their_names(header, joints, seconds, tmp_path):
         (
             "t a1 a2 x y",
             "",
-            "line 1 column heading columns t a1 a2 x y t,alpha_1",
+            "line 1 column heading columns t a1 a2 x y t,alpha_1 | where because instead",
         ),
         (
             "t b1 b2 x y yaw",
             "",
-            "line 1 columns joint gait two columns",
+            "line 1 columns joint gait two columns | where because instead",
         ),
-        ("t a1 bend x y yaw", "", "line 1 column joint gait"),
-        ("t a1 a2 a1 x y yaw", "", "line 1 column a1 twice"),
+        ("t a1 bend x y yaw", "", "line 1 column joint gait | where because instead"),
+        ("t a1 a2 a1 x y yaw", "", "line 1 column a1 twice | where instead"),
         (
             "t a1 a2 x y yaw theta",
             "",
-            "line 1 yaw theta column heading",
+            "line 1 yaw theta column heading | where instead",
         ),
         (
             "t a b x y c",
             "t a b x y d",
-            "line 1 column d columns t b x y c",
+            "line 1 column d columns t b x y c | where",
         ),
-        ("t a x y c", "t a x y c", "columns t two joint"),
-        ("t a b x y c", "t a a x y c", "columns t"),
-        ("t a1 a2 a3 a4 a5 a6 a7 x y yaw", "", "7 joint 6"),
-        ("t a1 a2 x_mm y yaw", "", "line 1 x_mm y different units"),
+        ("t a x y c", "t a x y c", "columns t two joint | where"),
+        ("t a b x y c", "t a a x y c", "columns t | where"),
+        ("t a1 a2 a3 a4 a5 a6 a7 x y yaw", "", "7 joint 6 | where instead"),
+        ("t a1 a2 x_mm y yaw", "", "line 1 x_mm y different units | where instead"),
         (
             "t a1 a2 x_px y_px yaw",
             "",
-            "line 1 x_px unit px x y body",
+            "line 1 x_px unit px x y body | where instead",
         ),
-        ("t a1 a2 x_N y_N yaw", "", "line 1 x_n unit N"),
+        ("t a1 a2 x_N y_N yaw", "", "line 1 x_n unit N | where instead"),
         (
             "t a1_mm a2_mm x y yaw",
             "",
-            "line 1 a1_mm unit mm rad degrees",
+            "line 1 a1_mm unit mm rad degrees | where instead",
         ),
         (
             "t a1_deg a2 x y yaw",
             "",
-            "line 1 a2 unit joints",
+            "line 1 a2 unit joints | where instead",
         ),
         (
             "hello",
             "",
-            "header columns CSV file header t,alpha_1,alpha_2,x,y,heading",
+            "header columns CSV file header t,alpha_1,alpha_2,x,y,heading | where instead",
         ),
     ],
 )
 def test_columns_that_a_log_lacks_are_named(header, columns, said, tmp_path):
     path = columns_of(tmp_path / "log.csv", header, column=0)
-    with refused("^log.csv.*" + in_order(said)):
+    with refuses(said, "log.csv"):
         measured.read(path, columns=columns.split())
 
 
 def test_harmonics_beyond_the_rows_are_refused_before_the_fit(viscous, monkeypatch):
     log = log_of(synthetic.synthetic_log(viscous, GAIT, cycles=12, samples=20))
     monkeypatch.setattr(smooth, "smoothed", lambda *_: pytest.fail("it was smoothed"))
-    with refused(in_order("harmonics 5 9")):
+    with refuses("harmonics 5 9 | where"):
         measured.fit_log(log, harmonics=9)
 
 
@@ -880,22 +881,22 @@ IN_DEGREES = "t a1_deg a2_deg x y heading_deg"
             "t a1 a2 x y heading",
             1,
             -6.34,
-            "line 52 a1 reaches -6.3 joint rad degrees",
+            "line 52 a1 reaches -6.3 joint rad degrees | where instead",
         ),
         (IN_DEGREES, 2, 1799.0, ""),
         (
             IN_DEGREES,
             2,
             -1805.0,
-            "line 52 a2_deg reaches -1805 degrees joint turns",
+            "line 52 a2_deg reaches -1805 degrees joint turns | where because",
         ),
         (
             "t a1 a2 x y heading",
             5,
             331.0,
-            "line 52 heading jumps 331 full degrees degrees",
+            "line 52 heading jumps 331 full degrees degrees | where instead",
         ),
-        ("t a1 a2 x y heading", 5, -389.0, "jumps 38"),
+        ("t a1 a2 x y heading", 5, -389.0, "jumps 38 | where instead"),
         ("t a1 a2 x y heading", 5, 329.0, ""),
         ("t a1 a2 x y heading", 5, 391.0, ""),
         (IN_DEGREES, 5, 360.0, ""),
@@ -904,7 +905,7 @@ IN_DEGREES = "t a1_deg a2_deg x y heading_deg"
 @pytest.mark.filterwarnings("ignore:.*joint angles are at most")
 def test_degrees_are_told_from_radians(header, column, value, said, tmp_path):
     path = columns_of(tmp_path / "log.csv", header, 120, value, column)
-    with refused(in_order(said)):
+    with refuses(said):
         measured.read(path)
 
 
@@ -990,7 +991,7 @@ def test_a_left_handed_pose_is_refused(moving):
         moving.pose[:, [1, 0, 2]],
         moving.pose * [1, 1, -1] + [0, 0, 2],
     ):
-        with refused(in_order("x y heading y up")):
+        with refuses("x y heading y up | where instead"):
             measured.fit_log(log_of(moving._replace(pose=wrong)), harmonics=2)
 
 

@@ -9,11 +9,11 @@ import re
 import numpy as np
 import pytest
 from commands import geomech as command
+from refusals import refuses
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicSpline
 from scipy.special import ellipe
 from tabled import of_json
-from words import in_order
 
 import geomech
 from geomech.mathematics.gaits import Sine
@@ -66,6 +66,63 @@ def trial_of(t, points, name="trial.csv"):
     frames, count = points.shape[:2]
     lines = np.repeat(2 + np.arange(frames)[:, None], count, 1)
     return Trial(name, t, points, tuple(str(k + 1) for k in range(count)), lines, "BL")
+
+
+def sampled_cycles(seed, spread, noise, count=8, n_quantities=4):
+    """Cycles that vary by ``spread`` about 0, measured with noise."""
+    rng = np.random.default_rng(seed)
+    cycles = spread * rng.normal(size=(count, n_quantities))
+    measured = cycles + noise * rng.normal(size=cycles.shape)
+    noisy = measured + noise * rng.normal(size=(40, *cycles.shape))
+    no_change = np.zeros(n_quantities)
+    return intervals.Sample(
+        measured.mean(0), measured, noisy.mean(1), noisy, no_change, noisy[:, 0] * 0
+    )
+
+
+@pytest.mark.parametrize(
+    ("spread", "noise", "least", "largest"),
+    # Half widths over those of the true variance of the mean.
+    [(0.0, 1.0, 1.0, 1.1), (1.0, 0.1, 1.35, 1.55), (1.0, 1.0, 1.15, 1.35)],
+)
+def test_intervals_of_cycles_cover_their_mean_and_are_hardly_wider(
+    spread, noise, least, largest
+):
+    level = 0.9
+    found = [
+        intervals.intervals(sampled_cycles(seed, spread, noise), level)
+        for seed in range(100)
+    ]
+    half_width = np.array([x.half_width for x in found])
+    is_covered = np.abs([x.value for x in found]) < half_width
+    assert level - 0.03 < is_covered.mean() < level + 0.08
+    usual = 1.645 * np.hypot(spread, noise) / 8**0.5
+    assert least * usual < half_width.mean() < largest * usual
+    parts = [np.hypot(x.cycles, np.hypot(x.noise, x.smoothing)) for x in found]
+    np.testing.assert_allclose(half_width, 1.6448536 * np.array(parts), rtol=1e-6)
+
+
+def test_the_error_of_one_cycle_is_its_noise_and_what_smoothing_cuts_off():
+    """Of noise of variance 1 about a bias of 1, and of a change of 3 by smoothing
+    which noise makes 2 +- 1."""
+    noisy = np.array([[10.0], [11.0], [12.0]])
+    sample = intervals.Sample(
+        value=np.array([10.0]),
+        pseudo=np.array([[10.0]]),
+        noisy=noisy,
+        noisy_pseudo=noisy[:, None],
+        change=np.array([3.0]),
+        noisy_change=noisy - 9.0,
+    )
+    found = intervals.intervals(sample, 0.95)
+    noise = 1.0 + intervals.UNSURE**2
+    smoothing = (2 * 3 - 2) ** 2 - 1.0
+    assert found.value == 9.0
+    assert found.noise**2 == pytest.approx(noise)
+    assert found.smoothing**2 == pytest.approx(smoothing)
+    half_width = 1.959964 * (noise + smoothing) ** 0.5
+    assert found.half_width == pytest.approx(half_width)
+    assert found.cycles == pytest.approx(0.0)
 
 
 @pytest.fixture(scope="module")
@@ -447,124 +504,130 @@ INDIVIDUALS = "scorer,net,net\nindividuals,one,two\nbodyparts,a,a\ncoords,x,y\n0
             "\n1,3,7,7\n",
             "\n1,3\n",
             {},
-            "line 9 2 4 columns row",
+            "line 9 2 4 columns row | where instead",
         ),
         (
             LONG,
             "\n0,4,",
             "\n,4,",
             {},
-            "line 5 column t time time",
+            "line 5 column t time time | where instead",
         ),
         (
             LONG,
             "\n0,4,3,3",
             "\n0,4,3,1e13",
             {},
-            "line 5 column y 1e13 number most 1e+12",
+            "line 5 column y 1e13 number most 1e+12 | where instead",
         ),
         (
             LONG,
             "\n1,4,8,8",
             "\n1,2,8,8",
             {},
-            "line 10 point 2 twice t = 1",
+            "line 10 point 2 twice t = 1 | where instead",
         ),
         (
             LONG.replace("point", "other"),
             "\n0,4,3,3",
             "\n5,4,3,3",
             {},
-            "line 2 4 points t = 0 most 5 times",
+            "line 2 4 points t = 0 most 5 times | where instead",
         ),
-        (LONG, "x,y", "x,x", {}, "line 1 column x twice"),
-        (LONG, "t,", "t_mm,", {}, "line 1 t_mm mm t s ms"),
+        (LONG, "x,y", "x,x", {}, "line 1 column x twice | where instead"),
+        (LONG, "t,", "t_mm,", {}, "line 1 t_mm mm t s ms | where instead"),
         (
             WIDE,
             ",y1,x2,y2,x3,y3,x4,y4",
             "",
             {},
-            "line 1 columns points columns t x0 y0 x1 CSV file",
+            "line 1 columns points columns t x0 y0 x1 CSV file | where because instead",
         ),
         (
             WIDE,
             "t,",
             "s,",
             {},
-            "line 1 column t frame columns s x0 column time t",
+            "line 1 column t frame columns s x0 column time t | where because instead",
         ),
         (
             WIDE,
             "x0,y0",
             "x_0_mm,y_0_mm",
             {},
-            "line 1 columns mm unit x y unit",
+            "line 1 columns mm unit x y unit | where instead",
         ),
         (
             WIDE,
             "\n3,",
             "\n2,",
             {},
-            "line 5 t = 2 twice rows",
+            "line 5 t = 2 twice rows | where instead",
         ),
         (
             WIDE,
             "\n3,",
             "\n1.5,",
             {},
-            "line 5 t = 1.5 2 rows time",
+            "line 5 t = 1.5 2 rows time | where instead",
         ),
         (
             WIDE,
             "t,",
             "frame,",
             {"points": ["3", "2", "1", "3", "4"]},
-            "columns point twice",
+            "columns point twice | where instead",
         ),
-        (WIDE, "", "", {"points": ["0", "1", "2", "3", "7"]}, "7"),
+        (
+            WIDE,
+            "",
+            "",
+            {"points": ["0", "1", "2", "3", "7"]},
+            "7 | where instead",
+        ),
         (
             WIDE,
             "",
             "",
             {"points": ["0", "1", "2", "3"]},
-            "4 points body 5 1000 10",
+            "4 points body 5 1000 10 | where instead",
         ),
-        (WIDE, "\n11,0,1,2,3,4,5,6,7,8,-2", "", {}, "11 frames"),
+        (WIDE, "\n11,0,1,2,3,4,5,6,7,8,-2", "", {}, "11 frames | where instead"),
         (
             WIDE,
             "",
             "",
             {"fps": 50.0},
-            "fps file frames file time",
+            "fps file frames file time | instead",
         ),
         (
             LONG,
             "x,y",
             "x_mm,y_mm",
             {"units": "cm"},
-            "column x y mm units",
+            "column x y mm units | where instead",
         ),
         (
             LONG,
             "x,y",
             "x_mm,y_mm",
             {"scale": 0.4},
-            "scale pixels x y mm",
+            "scale pixels x y mm | where instead",
         ),
         (
             LONG,
             "",
             "",
             {"units": "cm", "scale": 0.4},
-            "scale pixels x y cm",
+            "scale pixels x y cm | where instead",
         ),
-        (TRACKS, "", "", {}, "2 animals b a"),
-        (INDIVIDUALS, "", "", {}, "2 individuals one two"),
+        (TRACKS, "", "", {}, "2 animals b a | where instead"),
+        (INDIVIDUALS, "", "", {}, "2 individuals one two | where instead"),
     ],
 )
 def test_bad_files_are_refused_by_place(text, old, new, options, said, tmp_path):
     (tmp_path / "f.csv").write_text(text.replace(old, new, 1))
-    with refused(in_order(said)):
+    with refuses(said):
         reader.read(tmp_path / "f.csv", **options)
 
 
@@ -704,54 +767,60 @@ def bent_back(degrees):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (at(30, lambda p: 3.9 * p[30]), "jumps 0.29"),
-        (at(30, lambda p: p[30] / 3.9), "jumps 0.074"),
+        (at(30, lambda p: 3.9 * p[30]), "jumps 0.29 | where instead"),
+        (at(30, lambda p: p[30] / 3.9), "jumps 0.074 | where instead"),
         (
             at(30, lambda p: 4.1 * p[30]),
-            "line 32 t = 3 body 4.1 times long most frames",
+            "line 32 t = 3 body 4.1 times long most frames | where instead",
         ),
         (
             at(30, lambda p: p[30] / 4.1),
-            "body 0.244 times long most frames",
+            "body 0.244 times long most frames | where instead",
         ),
-        (at(30, lambda p: 12.9 * p[30]), "frames mm m another unit"),
-        (at(30, lambda p: 13.1 * p[30]), "most frames"),
-        (at(30, lambda p: p[30] / 129), "mm m"),
-        (at(30, lambda p: p[30] / 132), "most frames"),
-        (at(30, lambda p: 710 * p[30]), "mm m"),
+        (at(30, lambda p: 12.9 * p[30]), "frames mm m another unit | where instead"),
+        (at(30, lambda p: 13.1 * p[30]), "most frames | where instead"),
+        (at(30, lambda p: p[30] / 129), "mm m | where instead"),
+        (at(30, lambda p: p[30] / 132), "most frames | where instead"),
+        (at(30, lambda p: 710 * p[30]), "mm m | where instead"),
         (bent_back(119), ""),
-        (bent_back(121), "body turns back 4 5 6 most frames points"),
+        (
+            bent_back(121),
+            "body turns back 4 5 6 most frames points | where because instead",
+        ),
         (at((slice(20), 4), np.nan), ""),
         (
             at((slice(21), 4), np.nan),
-            "trial.csv point 5 missing 52.5 % frames",
+            "trial.csv point 5 missing 52.5 % frames | where instead",
         ),
-        (at((slice(None), 3), 0.0), "point 4 moves"),
-        (at((slice(None), 4), lambda p: p[:, 3]), "points 4 5 coincide"),
+        (at((slice(None), 3), 0.0), "point 4 moves | where instead"),
+        (
+            at((slice(None), 4), lambda p: p[:, 3]),
+            "points 4 5 coincide | where instead",
+        ),
         (at((slice(20), [0, 1, 2, 3]), np.nan), ""),
         (turned_beside(0.25), ""),
         (
             turned_beside(0.22),
-            "line 2 t = 0 12 frames body first",
+            "line 2 t = 0 12 frames body first | where instead",
         ),
         (moved(0.0, 0.0, 0.029), ""),
         (
             moved(0.0, 0.0, 0.031),
-            "line 22 t = 2 point 4 jumps 0.031 body",
+            "line 22 t = 2 point 4 jumps 0.031 body | where instead",
         ),
         (moved(0.01, 0.0, 0.079), ""),
-        (moved(0.01, 0.0, 0.081), "jumps 0.081"),
+        (moved(0.01, 0.0, 0.081), "jumps 0.081 | where instead"),
         (moved(0.0, 0.01, 0.089), ""),
-        (moved(0.0, 0.01, 0.091), "jumps 0.091"),
-        (moved(0.0, 0.02, -0.25), "jumps 0.25 body"),
+        (moved(0.0, 0.01, 0.091), "jumps 0.091 | where instead"),
+        (moved(0.0, 0.02, -0.25), "jumps 0.25 body | where instead"),
         (
             at((30, [2, 8]), lambda p: p[30, [8, 2]]),
-            "line 32 t = 3 point 3 points 3 9 swap",
+            "line 32 t = 3 point 3 points 3 9 swap | where instead",
         ),
     ],
 )
 def test_slips_of_tracking_are_refused_by_place(change, said):
-    with refused(in_order(said)):
+    with refuses(said):
         slips.checked(change(line_of()), False)
 
 
@@ -817,52 +886,55 @@ def slower(by):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (sized(120, unit="m"), "body 1 m long unit x y"),
-        (sized(9e-5, unit="m"), "body m long"),
-        (sized(2), "body body long unit"),
-        (sized(0.69), "body 0.69 body"),
+        (sized(120, unit="m"), "body 1 m long unit x y | where instead"),
+        (sized(9e-5, unit="m"), "body m long | where instead"),
+        (sized(2), "body body long unit | where instead"),
+        (sized(0.69), "body 0.69 body | where instead"),
         (
             sized(1, length=0.7),
-            "points 1 body 0.7 long body_length unit x y",
+            "points 1 body 0.7 long body_length unit x y | where instead",
         ),
-        (at((slice(None), [3, 20]), lambda p: p[:, [20, 3]]), "turns back"),
+        (
+            at((slice(None), [3, 20]), lambda p: p[:, [20, 3]]),
+            "turns back | where because instead",
+        ),
         (
             lambda t: frames_of(t, slice(None, None, 4)),
-            "frames cycle few 10",
+            "frames cycle few 10 | where instead",
         ),
         (
             lambda t: frames_of(t, slice(20)),
-            "trial 0. cycles",
+            "trial 0. cycles | where instead",
         ),
         (
             at(
                 np.indices((133, 30)).sum(0) % 2 * (np.arange(133) > 9)[:, None] > 0,
                 np.nan,
             ),
-            "10 frames most",
+            "10 frames most | where instead",
         ),
-        (standing, "body bends back shape"),
+        (standing, "body bends back shape | where because instead"),
         (
             backwards,
-            "moves 1 point most head head first last",
+            "moves 1 point most head head first last | where because instead",
         ),
-        (wandering, "body repeat cycle"),
+        (wandering, "body repeat cycle | where instead"),
         (
             rippling,
-            "cycle t = 0.2371 1.215 repeat",
+            "cycle t = 0.2371 1.215 repeat | where instead",
         ),
         (
             lambda t: frames_of(t, np.arange(133) % 30 < 20),
-            "frames follow 0.367 cycle gap",
+            "frames follow 0.367 cycle gap | where instead",
         ),
         (
             slower(2.0),
-            "cycle t = 1.16 3.499 1.7 times long most",
+            "cycle t = 1.16 3.499 1.7 times long most | where instead",
         ),
     ],
 )
 def test_trials_that_do_not_tell_are_refused(change, said, noisy):
-    with refused(in_order(said)):
+    with refuses(said):
         fit.fit_midlines(change(noisy.trial()), mend=True)
 
 

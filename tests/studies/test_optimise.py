@@ -494,6 +494,9 @@ def test_outlines_treat_both_joints_and_both_senses_of_each_alike():
     for signs in ((-1, 1), (1, -1), (-1, -1)):
         assert {corners(outline, signs) for outline in series.OUTLINES} == outlines
     assert max(np.abs(outline).max() for outline in series.OUTLINES) == 1.0
+    for outline in series.OUTLINES:  # anticlockwise
+        x, y = np.transpose([*outline, outline[0]])
+        assert (x[:-1] * y[1:] - x[1:] * y[:-1]).sum() > 0
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -4,9 +4,9 @@ import hashlib
 
 import numpy as np
 import pytest
+from refusals import refuses
 from scipy.io import savemat
 from structs import cell, save
-from words import in_order
 
 import rft
 from geomech import scenes
@@ -15,7 +15,6 @@ from geomech.mathematics.gaits import Butterfly, Circle, Shchf
 from geomech.mathematics.systems import Swimmer
 from geomech.scenes import Scene
 from geomech.studies.scene_tables import SceneTables
-from rft.core.refusal import Refusal
 
 T = np.linspace(0, 2 * np.pi, 201)
 CIRCLE = Circle(amplitude=0.8, centre=(0.3, -0.2))
@@ -143,41 +142,45 @@ ONE_JOINT = {"A1": [0.0, 1.0], "B1": [0.0, 1.0]}
 @pytest.mark.parametrize(
     ("variables", "settings", "said"),
     [
-        ({"x": 1.0}, {}, "no gait alpha1 alpha2"),
-        ({"A1": [0.0, 1.0], "B1": [0.0]}, {}, "no gait"),
-        ({"A1": [0.1], "B1": [0.0]}, {}, "no gait"),
-        ({"A1": [0.1, 1], "A2": [0.1, 1], "B1": [0.0, 5]}, {}, "no gait"),
-        ({"A2": [0.1, 1], "B2": [0.0, 5]}, {}, "no gait"),
-        (ONE_JOINT, {"number": 2}, "gait number 2 number"),
+        ({"x": 1.0}, {}, "no gait alpha1 alpha2 | because instead"),
+        ({"A1": [0.0, 1.0], "B1": [0.0]}, {}, "no gait | because instead"),
+        ({"A1": [0.1], "B1": [0.0]}, {}, "no gait | because instead"),
+        (
+            {"A1": [0.1, 1], "A2": [0.1, 1], "B1": [0.0, 5]},
+            {},
+            "no gait | because instead",
+        ),
+        ({"A2": [0.1, 1], "B2": [0.0, 5]}, {}, "no gait | because instead"),
+        (ONE_JOINT, {"number": 2}, "gait number 2 number | instead"),
         (
             {"p": {"phi_def": 1.0}},
             {},
-            "no gait function handles",
+            "no gait function handles | because instead",
         ),
-        (NO_PATH, {}, "p.phi_locus_full{1} shapes"),
-        (NO_PATH, {"number": 2}, "1 gaits number 2 number = 1 1"),
-        (NO_PATH, {"number": 0}, "1 gaits number 0 number = 1 1"),
-        (ONE_JOINT, {"sha256": "0"}, "sha256"),
+        (NO_PATH, {}, "p.phi_locus_full{1} shapes | instead"),
+        (NO_PATH, {"number": 2}, "1 gaits number 2 number = 1 1 | instead"),
+        (NO_PATH, {"number": 0}, "1 gaits number 0 number = 1 1 | instead"),
+        (ONE_JOINT, {"sha256": "0"}, "sha256 | instead"),
     ],
 )
 def test_files_without_a_gait_are_refused(variables, settings, said, tmp_path):
     savemat(tmp_path / "a.mat", variables)
-    with pytest.raises(Refusal, match=in_order(said)):
+    with refuses(said):
         Shchf(file=tmp_path / "a.mat", **settings)
 
 
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
-        ({}, "XV file"),
-        ({"XV": (1.0, 1.0), "file": "a.mat"}, "XV file"),
-        ({"XV": (1.0, 1.0, 0.1)}, "XV a1 b1 a3 b3"),
-        ({"file": "none.mat"}, "gait none.mat file"),
-        ({"file": 3}, "file file 3"),
+        ({}, "XV file | instead"),
+        ({"XV": (1.0, 1.0), "file": "a.mat"}, "XV file | instead"),
+        ({"XV": (1.0, 1.0, 0.1)}, "XV a1 b1 a3 b3 | value"),
+        ({"file": "none.mat"}, "gait none.mat file | because"),
+        ({"file": 3}, "file file 3 | value"),
     ],
 )
 def test_settings_that_make_no_gait_are_refused(settings, said):
-    with pytest.raises(Refusal, match=in_order(said)):
+    with refuses(said):
         Shchf(**settings)
 
 
@@ -187,27 +190,27 @@ SQUARE = {"alpha1": [0, 1, 1, 0], "alpha2": [0, 0, 1, 0], "t": [1, 2, 3, 4]}
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"alpha1": 31.42 * np.sin(T)}, "up 31.42 rad"),
+        ({"alpha1": 31.42 * np.sin(T)}, "up 31.42 rad | instead"),
         (
             {"alpha2": np.sin(T) + 2.1e-3 * T / T[-1]},
-            "closed 0.0021 rad",
+            "closed 0.0021 rad | because instead",
         ),
         (
             {"alpha1": [0, 1, 0], "alpha2": [0, 0, 0], "t": [1, 2, 3]},
-            "four shapes",
+            "four shapes | instead",
         ),
-        ({"t": [*T[:100], *T[99:-1]]}, "four shapes times"),
-        ({"t": T[:9]}, "four shapes times"),
-        ({"alpha2": np.sin(T[:-1])}, "four shapes"),
+        ({"t": [*T[:100], *T[99:-1]]}, "four shapes times | instead"),
+        ({"t": T[:9]}, "four shapes times | instead"),
+        ({"alpha2": np.sin(T[:-1])}, "four shapes | instead"),
         (
             {"alpha2": np.nan * T},
-            "alpha2 finite 0 0 file",
+            "alpha2 finite 0 0 file | instead",
         ),
         ({"alpha1": "words"}, "alpha1 real"),
     ],
 )
 def test_points_that_make_no_gait_are_refused(changes, said, tmp_path):
-    with pytest.raises(Refusal, match=in_order(said)):
+    with refuses(said):
         Shchf(file=points(tmp_path / "a.mat", **changes))
 
 

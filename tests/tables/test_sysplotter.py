@@ -3,14 +3,13 @@
 import contextlib
 import functools
 import operator
-import re
 import sys
 
 import numpy as np
 import pytest
+from refusals import refuses
 from scipy.io import loadmat
 from structs import cell, computed, save, struct
-from words import in_order
 
 import rft
 from geomech.io import tables
@@ -262,95 +261,95 @@ def spoilt(value):
         (
             ("vecfield",),
             None,
-            "s.vecfield.eval.content.Avec sys_calc",
+            "s.vecfield.eval.content.Avec sys_calc | instead",
         ),
-        (("grid", "eval"), None, "s.grid.eval"),
+        (("grid", "eval"), None, "s.grid.eval | instead"),
         (
             ("grid", "eval"),
             np.ones((5, 4)),
-            "s.grid.eval cell",
+            "s.grid.eval cell | instead",
         ),
-        (("grid", "eval"), lambda x: x[:1], "s.grid.eval cell"),
+        (("grid", "eval"), lambda x: x[:1], "s.grid.eval cell | instead"),
         (
             ("grid", "eval"),
             lambda x: -x,
-            "grid s.grid.eval{1} 4 ascending",
+            "grid s.grid.eval{1} 4 ascending | instead",
         ),
         (
             ("grid", "eval"),
             lambda x: 57.3 * x,
-            "s.grid.eval{1} up 57.3 rad",
+            "s.grid.eval{1} up 57.3 rad | instead",
         ),
         (
             ("grid", "eval"),
             lambda x: cell(np.array([y.T for y in x.ravel()]), (2,)),
-            "s.grid.eval{1} dimensions 1",
+            "s.grid.eval{1} dimensions 1 | because instead",
         ),
         (
             ("grid", "eval", (0, 0)),
             lambda x: x + 2e-9 * np.eye(5, 4),
-            "s.grid.eval{1} dimensions 1",
+            "s.grid.eval{1} dimensions 1 | because instead",
         ),
         (
             ("grid", "eval", (0, 0)),
             spoilt(np.nan),
-            "s.grid.eval{1} finite 3 4 file",
+            "s.grid.eval{1} finite 3 4 file | instead",
         ),
         (
             ("grid", "eval", (1, 0)),
             np.ones((4, 5)),
-            "s.grid.eval different shapes 5 4",
+            "s.grid.eval different shapes 5 4 | instead",
         ),
         (
             (*CONTENT, "Avec"),
             lambda x: x[:2],
-            "s.vecfield.eval.content.Avec cell 3 x 2",
+            "s.vecfield.eval.content.Avec cell 3 x 2 | instead",
         ),
         (
             (*CONTENT, "Avec", (2, 1)),
             np.ones((4, 5)),
-            "s.vecfield.eval.content.Avec{3 2} shape 4 5 grid",
+            "s.vecfield.eval.content.Avec{3 2} shape 4 5 grid | instead",
         ),
         (
             (*CONTENT, "Avec", (1, 0)),
             spoilt(np.nan),
-            "s.vecfield.eval.content.Avec{2 1} finite",
+            "s.vecfield.eval.content.Avec{2 1} finite | instead",
         ),
         (
             (*CONTENT, "A_num"),
             cell(-NEGATIVE, (3, 2)),
-            "damaged s.vecfield.eval.content.Avec{1 1} negative A_n",
+            "damaged s.vecfield.eval.content.Avec{1 1} negative A_n | instead",
         ),
         (
             (*CONTENT, "A_num"),
             cell(NEGATIVE * (1 + 1e-8), (3, 2)),
-            "damaged s.vecf",
+            "damaged s.vecf | instead",
         ),
         (
             ("DA",),
             lambda x: x[:2],
-            "s.DA cell 3 x 1",
+            "s.DA cell 3 x 1 | instead",
         ),
         (
             (*METRIC, (0, 1)),
             lambda x: x + 1e-7,
-            "s.metricfield.metric_eval.content.metric symmetric {1 2",
+            "s.metricfield.metric_eval.content.metric symmetric {1 2 | instead",
         ),
         (
             ("grid", "metric_eval", (0, 0)),
             lambda x: x + 0.2 + 4e-9,
-            "s.grid.metric_eval cover s.grid.eval",
+            "s.grid.metric_eval cover s.grid.eval | instead",
         ),
         (
             ("grid", "metric_eval", (1, 0)),
             lambda x: x - 0.05 - 4e-9,
-            "s.grid.metric_eval cover",
+            "s.grid.metric_eval cover | instead",
         ),
     ],
 )
 def test_a_bad_struct_is_refused_by_place_and_cure(place, value, said, tmp_path):
     path = uneven(tmp_path / "s.mat", (place, value))
-    with pytest.raises(Refusal, match=f"{re.escape(str(path))}.*{in_order(said)}"):
+    with refuses(said, str(path)):
         tables.load(path)
 
 
@@ -401,7 +400,10 @@ def test_damaged_files_of_version_7_3_are_refused_or_read_as_finite(tmp_path):
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
-        (lambda s: s.__setitem__("again", s), "damaged s.again.again"),
+        (
+            lambda s: s.__setitem__("again", s),
+            "damaged s.again.again | because instead",
+        ),
         (
             lambda s: s.__setitem__("far", h5py().SoftLink("/s/x")),
             "s.far another",
@@ -412,7 +414,7 @@ def test_links_in_files_of_version_7_3_are_refused(spoil, said, tmp_path):
     path = write(tmp_path / "s.mat", 7.3)
     with h5py().File(path, "a") as file:
         spoil(file["s"])
-    with pytest.raises(Refusal, match=in_order(said)):
+    with refuses(said):
         tables.load(path)
 
 

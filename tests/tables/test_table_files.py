@@ -1,14 +1,13 @@
 """What files of tables hold, part by part, and what is wrong with bad ones."""
 
 import json
-import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray
+from refusals import refuses
 from scipy.io import savemat
-from words import in_order
 
 from geomech.io import tables
 from rft.core.refusal import Refusal
@@ -20,7 +19,7 @@ ENTRIES = ("Ax1", "Ax2", "Ay1", "Ay2", "Atheta1", "Atheta2")
 
 def assert_refused(path, said, **options):
     """Assert that a table is refused by its name and these words, in their order."""
-    with pytest.raises(Refusal, match=f"{re.escape(str(path))}.*{in_order(said)}"):
+    with refuses(said, str(path)):
         tables.load(path, **options)
 
 
@@ -158,22 +157,22 @@ def test_parts_that_a_netcdf_file_lacks_are_none(tmp_path):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (less("joint"), "joint missing"),
-        (less("fit_residual"), "fit_residual missing"),
+        (less("joint"), "joint missing | instead"),
+        (less("fit_residual"), "fit_residual missing | instead"),
         (
             part("joint", ("joint", "k"), np.zeros((2, 1))),
-            "A dimensions component",
+            "A dimensions component | instead",
         ),
-        (part("joint", ("k",), np.arange(3)), "alpha_3 missing"),
+        (part("joint", ("k",), np.arange(3)), "alpha_3 missing | instead"),
         (
             part("alpha_2", ("alpha_2",), AXES[1], units="rads"),
-            "alpha_2 unit rads",
+            "alpha_2 unit rads | because",
         ),
-        (part("alpha_1", ("alpha_1",), 20 * AXES[0][::-1]), "grid alpha_1"),
-        (part("alpha_1", ("alpha_1",), 57 * AXES[0]), "alpha_1 up 57"),
+        (part("alpha_1", ("alpha_1",), 20 * AXES[0][::-1]), "grid alpha_1 | instead"),
+        (part("alpha_1", ("alpha_1",), 57 * AXES[0]), "alpha_1 up 57 | instead"),
         (
             both(less("A_error"), cut("A", np.s_[:, :1], ("component", "one", *GRID))),
-            "A dimensions component one alpha_1 alpha_2",
+            "A dimensions component one alpha_1 alpha_2 | instead",
         ),
         (
             both(
@@ -189,40 +188,40 @@ def test_parts_that_a_netcdf_file_lacks_are_none(tmp_path):
         ),
         (
             part("A", ("component", "joint", *GRID), np.ones((3, 2, 5, 4), "i4")),
-            "A shape 3 2 5 4 grid",
+            "A shape 3 2 5 4 grid | instead",
         ),
-        (put("A", (0, 1, 2, 3), np.inf), "A finite"),
-        (put("A", (0, 1, 2, 3), 2e9), "A above 1e+09 0 1 2 3"),
-        (attributes(length_unit="feet"), "body_length length_unit"),
-        (attributes(body_length=1e9), "body_length"),
-        (attributes(body_length=0), "body_length"),
-        (attributes(body_length=[0.3, 0.3]), "body_length"),
-        (attributes(body_length="1"), "body_length"),
-        (attributes(interpolation=4), "few shapes spline degree 4"),
+        (put("A", (0, 1, 2, 3), np.inf), "A finite | instead"),
+        (put("A", (0, 1, 2, 3), 2e9), "A above 1e+09 0 1 2 3 | instead"),
+        (attributes(length_unit="feet"), "body_length length_unit | instead"),
+        (attributes(body_length=1e9), "body_length | instead"),
+        (attributes(body_length=0), "body_length | instead"),
+        (attributes(body_length=[0.3, 0.3]), "body_length | instead"),
+        (attributes(body_length="1"), "body_length | instead"),
+        (attributes(interpolation=4), "few shapes spline degree 4 | instead"),
         (cut("harmonics", np.s_[:, :3]), "harmonics shape 3 3 5 4"),
-        (put("harmonics", (1, 2, 3, 0), np.nan), "harmonics finite"),
-        (put("even_part", (1, 2, 3), np.nan), "even_part finite"),
+        (put("harmonics", (1, 2, 3, 0), np.nan), "harmonics finite | instead"),
+        (put("even_part", (1, 2, 3), np.nan), "even_part finite | instead"),
         (
             cut("even_part", np.s_[:2], ("two", *GRID)),
-            "even_part dimensions two alpha_1 alpha_2",
+            "even_part dimensions two alpha_1 alpha_2 | instead",
         ),
         (
             cut("A_error", np.s_[:, :1], ("component", "one", *GRID)),
-            "A_error dimensions component one",
+            "A_error dimensions component one | instead",
         ),
         (put("A_error", (0, 1, 2, 3), -1e-9), "A_error below 0"),
         (
             cut("pair_joints", np.s_[:, ::-1]),
-            "pair_joints [[1 2]]",
+            "pair_joints [[1 2]] | instead",
         ),
         (
             both(less("pair_joints"), cut("ccf_pairs", np.s_[[0, 0]])),
-            "ccf_pairs shape 2 3 5 4 1 3",
+            "ccf_pairs shape 2 3 5 4 1 3 | instead",
         ),
-        (put("ccf_pairs", (0, 2, 1, 1), np.nan), "ccf_pairs finite"),
-        (attributes(power_degree=100.0), "power_degree valid"),
-        (attributes(power_degree=0), "power_degree"),
-        (attributes(power_degree=[1.0, 2.0]), "power_degree"),
+        (put("ccf_pairs", (0, 2, 1, 1), np.nan), "ccf_pairs finite | instead"),
+        (attributes(power_degree=100.0), "power_degree valid | instead"),
+        (attributes(power_degree=0), "power_degree | instead"),
+        (attributes(power_degree=[1.0, 2.0]), "power_degree | instead"),
         (
             cut("norm", np.s_[:4]),
             "norm shape 4 5 4",
@@ -237,12 +236,12 @@ def test_parts_that_a_netcdf_file_lacks_are_none(tmp_path):
         ),
         (
             masked("A", "fit_residual", "speed", "A_error"),
-            "A finite 0 0 1 2",
+            "A finite 0 0 1 2 | instead",
         ),
-        (masked("A", "A_error", **SINGULAR), "fit_residual singular shapes"),
-        (masked("A", "fit_residual", **SINGULAR), "A_error singular shapes"),
-        (masked("fit_residual", **SINGULAR), "fit_residual finite"),
-        (masked("A_error", **SINGULAR), "A_error finite"),
+        (masked("A", "A_error", **SINGULAR), "fit_residual singular shapes | instead"),
+        (masked("A", "fit_residual", **SINGULAR), "A_error singular shapes | instead"),
+        (masked("fit_residual", **SINGULAR), "fit_residual finite | instead"),
+        (masked("A_error", **SINGULAR), "A_error finite | instead"),
     ],
 )
 def test_parts_of_a_netcdf_file_that_do_not_fit_are_refused(change, said, tmp_path):
@@ -320,7 +319,7 @@ def test_parts_of_a_gait_are_where_they_belong(sign, turn, tmp_path):
     assert (found.level, found.factor) == (0.9, 2.1)
 
 
-UNFIT = "gait parts geomech fit-gait"
+UNFIT = "gait parts geomech fit-gait | instead"
 EVEN = {
     "gait_A": np.ones((3, 2, 4)),
     "gait_slope": np.ones((3, 2, 1, 4)),
@@ -334,15 +333,15 @@ EVEN = {
         (
             {"gait_A": np.ones((3, 2))},
             {},
-            "gait gait_A",
+            "gait gait_A | instead",
         ),
-        ({"gait_spread": None}, {}, "gait gait_spread"),
+        ({"gait_spread": None}, {}, "gait gait_spread | instead"),
         (
             {"gait": np.ones((2, 1))},
             {},
-            "gait move",
+            "gait move | instead",
         ),
-        ({"gait": np.zeros((2, 3))}, {}, "gait move"),
+        ({"gait": np.zeros((2, 3))}, {}, "gait move | instead"),
         ({"gait": np.ones((2, 4))}, {}, UNFIT),
         ({"gait_A": np.ones((2, 2, 5))}, {}, UNFIT),
         ({"gait_A": np.ones((3, 3, 5))}, {}, UNFIT),
@@ -439,13 +438,13 @@ def test_what_a_matlab_file_does_not_state_is_the_usual(tmp_path):
     [
         (
             ROWS,
-            "alpha1 alpha2 rows order order =",
+            "alpha1 alpha2 rows order order = | instead",
         ),
         (
             {"Ay2": PLAIN[:, :3]},
             "Ay2 shape 5 3 alpha1 alpha2",
         ),
-        ({"Ax1": np.full((5, 4), np.nan)}, "Ax1 finite"),
+        ({"Ax1": np.full((5, 4), np.nan)}, "Ax1 finite | instead"),
         ({"Ax1": np.full((5, 4), 1j)}, "Ax1 real"),
         ({"Ax1": "text"}, "Ax1 real"),
         ({"Ax1": {"a": 1}}, "Ax1 real"),
@@ -460,31 +459,31 @@ def test_what_a_matlab_file_does_not_state_is_the_usual(tmp_path):
         ),
         (
             {"alpha1": np.ones((5, 4))},
-            "grid alpha1 4 ascending",
+            "grid alpha1 4 ascending | instead",
         ),
         (
             {"alpha1": PLAIN},
-            "alpha1 alpha2 grid",
+            "alpha1 alpha2 grid | because",
         ),
         (
             {"alpha1": AXES[0][:, None] + 2e-9 * np.arange(4)},
-            "alpha1 alpha2 grid",
+            "alpha1 alpha2 grid | because",
         ),
         (
             {"alpha1": 6.4 * AXES[0][:, None] + 0 * PLAIN},
-            "alpha1 up 6.4 rad rad",
+            "alpha1 up 6.4 rad rad | instead",
         ),
         (
             {"M11": 0.25 / (1 + PLAIN)},
-            "M11 M12 M22 metric",
+            "M11 M12 M22 metric | because",
         ),
         (
             {"M11": -1 - PLAIN, "M22": -1 - PLAIN},
-            "M11 M12 M22 metric",
+            "M11 M12 M22 metric | because",
         ),
         (
             {"M22": 0 * PLAIN},
-            "M11 M12 M22 metric 0 0",
+            "M11 M12 M22 metric 0 0 | because",
         ),
         (
             {"M12": PLAIN[:4]},
@@ -497,11 +496,11 @@ def test_what_a_matlab_file_does_not_state_is_the_usual(tmp_path):
         ({"geomech_A_error": -np.ones((3, 2, 5, 4))}, "geomech_A_error below 0"),
         (
             {"geomech_A_error": np.full((3, 2, 5, 4), np.nan)},
-            "geomech_A_error finite",
+            "geomech_A_error finite | instead",
         ),
         (
             {"geomech_fit_residual": np.full((3, 5, 4), np.inf)},
-            "geomech_fit_residual finite",
+            "geomech_fit_residual finite | instead",
         ),
     ],
 )
@@ -512,7 +511,7 @@ def test_parts_of_a_matlab_file_that_do_not_fit_are_refused(changes, said, tmp_p
 
 def test_a_connection_without_x_does_not_tell_its_sign(tmp_path):
     matlab(tmp_path / "a.mat", {"Ax1": 0 * PLAIN, "Ax2": 0 * PLAIN})
-    assert_refused(tmp_path / "a.mat", "sign A sign")
+    assert_refused(tmp_path / "a.mat", "sign A sign | instead")
 
 
 @pytest.mark.parametrize(

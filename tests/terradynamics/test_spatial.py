@@ -3,6 +3,7 @@ forms and finer meshes."""
 
 import numpy as np
 import pytest
+from refusals import refuses
 from scipy.spatial.transform import Rotation
 
 from rft.terradynamics.meshes import Mesh, Spatial, Sphere, bearing, wrench
@@ -239,30 +240,32 @@ BALL = shapes.sphere(0.02, 1)
 REFUSED = [
     (
         lambda: Mesh(CUBE, SIDES[:-1]),
-        "open: 3 edges have only one triangle; close it, for",
+        "open 3 edges | because instead",
     ),
-    (lambda: Mesh(CUBE, SIDES[:, ::-1]), "inside out: its normals point inwards"),
-    (lambda: Mesh(CUBE, TURNED), "run along an edge of the mesh in the same direction"),
-    (lambda: Mesh(CUBE, DOUBLED), "reversed or duplicated"),
-    (lambda: Mesh(WITHIN, HOLLOW), "has an inner shell"),
-    (lambda: Mesh(CUBE, LINE), "no area"),
+    (lambda: Mesh(CUBE, SIDES[:, ::-1]), "normals | because instead"),
+    (lambda: Mesh(CUBE, TURNED), "two edge | because instead"),
+    (lambda: Mesh(CUBE, DOUBLED), "duplicated | because instead"),
+    (lambda: Mesh(WITHIN, HOLLOW), "shell | because instead"),
+    (lambda: Mesh(CUBE, LINE), "1 of 12 area | instead"),
     (lambda: Mesh(CUBE * np.nan, SIDES), "finite"),
-    (lambda: Mesh(CUBE[:-1], SIDES), "names vertex 7"),
+    (lambda: Mesh(CUBE[:-1], SIDES), "vertex 7 0 6 | instead"),
     (
-        lambda: wrench(MEDIUM, BALL, 2 * UPRIGHT, STILL, STILL, STILL),
-        "rotation matrices",
+        lambda: wrench(MEDIUM, BALL, (1 + 0.8e-9) * UPRIGHT, STILL, STILL, STILL),
+        "rotation matrices | because",
     ),
-    (lambda: wrench(MEDIUM, BALL, -UPRIGHT, STILL, STILL, STILL), "rotation matrices"),
-    (lambda: Spatial.from_grains(3000, 30.0), "friction"),
-    (lambda: shapes.leg(0.02, 1.0, 0.03, 0.01), "thickness"),
+    (
+        lambda: wrench(MEDIUM, BALL, -UPRIGHT, STILL, STILL, STILL),
+        "rotation matrices | because",
+    ),
+    (lambda: Spatial.from_grains(3000, 30.0), "friction 0.05 1.5 30.0 | value"),
+    (lambda: shapes.leg(0.02, 1.0, 0.03, 0.01), "thickness 0.03 0.02"),
 ]
 
 
 @pytest.mark.parametrize(("build", "said"), REFUSED, ids=[said for _, said in REFUSED])
 def test_what_makes_no_sense_is_refused(build, said):
-    with pytest.raises(ValueError, match=said) as told:
+    with refuses(said):
         build()
-    assert "\n" not in str(told.value)
 
 
 @pytest.mark.parametrize(

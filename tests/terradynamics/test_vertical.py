@@ -6,6 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
+from refusals import refuses
 from registry import OUTLINES, STRESSES
 from scipy.integrate import quad
 
@@ -419,28 +420,30 @@ FLAT = OUTLINES["plate"].outline()
 # The chords between its points do not cross.
 LOOP = [(0.026, 0), (0.003, 0.029), (-0.009, 0.023), (0.021, 0.043), (-0.039, 0.023)]
 REFUSED = [
-    (lambda: PlateDrags(*[[0] * 5] * 4), "plate drags must be 6 to 5000, got 5"),
-    (lambda: PlateDrags([0, 1], [0], [0], [0]), "must have the same length"),
-    (lambda: PlateDrags(*[LINE] * 4), "no plate drag lies within 35 degrees of beta"),
-    (lambda: Wheel(0.1, 0.1, 40, 0.01, 0.02), "lug_width must be below 0.0157 m"),
-    (lambda: Wheel(0.1, 0.1, lug_height=0.01), "need lugs"),
+    (lambda: PlateDrags(*[[0] * 5] * 4), "6 5000 5"),
+    (lambda: PlateDrags([0, 1], [0], [0], [0]), "beta gamma alpha_x alpha_z length"),
+    (lambda: PlateDrags(*[LINE] * 4), "35 degrees beta gamma"),
+    (lambda: Wheel(0.1, 0.1, 40, 0.01, 0.02), "lug_width 0.0157 m"),
+    (lambda: Wheel(0.1, 0.1, lug_height=0.01), "lugs | instead"),
     (
         lambda: Polygon(BOWTIE, 0.1),
-        r"elements \[0\] and \[2\] of the outline intersect",
+        "[0] [2] | instead",
     ),
-    (lambda: Polygon(TOUCHES, 0.1), "intersect or touch"),
-    (lambda: Spline(LOOP, 0.1), r"elements \[3\] and \[6\] of the outline intersect"),
-    (lambda: Polygon([(0, 0), (1, 0), (0.5, 0)], 0.1, closed=False), "turns back onto"),
-    (lambda: Rotate(0.02, rate=0.0), "rate must not be 0"),
-    (lambda: Path([0, 2, 1], [0, 1, 2], [0, 1, 2]), "t must increase, but t = 2"),
-    (lambda: Path([0, 1, 2], [0, 1], [0, 1, 2]), "the same length"),
-    (lambda: loads(M0, FLAT, (0, 0), (1, 0, 0)), r"pose must have shape \(..., 3\)"),
-    (lambda: loads(M0, FLAT, (0, 0, 0), (1, np.nan, 0)), "twist must be finite"),
+    (lambda: Polygon(TOUCHES, 0.1), "intersect | instead"),
+    (lambda: Spline(LOOP, 0.1), "[3] [6] | instead"),
+    (
+        lambda: Polygon([(0, 0), (1, 0), (0.5, 0)], 0.1, closed=False),
+        "[0] point | instead",
+    ),
+    (lambda: Rotate(0.02, rate=0.0), "rate 0 drag | instead"),
+    (lambda: Path([0, 2, 1], [0, 1, 2], [0, 1, 2]), "t 2"),
+    (lambda: Path([0, 1, 2], [0, 1], [0, 1, 2]), "t, x, z angle length"),
+    (lambda: loads(M0, FLAT, (0, 0), (1, 0, 0)), "pose (..., 3) | value"),
+    (lambda: loads(M0, FLAT, (0, 0, 0), (1, np.nan, 0)), "twist finite"),
 ]
 
 
 @pytest.mark.parametrize(("build", "said"), REFUSED, ids=[said for _, said in REFUSED])
 def test_what_makes_no_sense_is_refused_with_one_line(build, said):
-    with pytest.raises(ValueError, match=said) as caught:
+    with refuses(said):
         build()
-    assert "\n" not in str(caught.value)

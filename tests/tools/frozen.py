@@ -10,7 +10,7 @@ scenes, and a file of every format as the first version with these records wrote
 later ones read them.
 
 Names, numbers, keys and exit codes are fixed, wording is free (`words`): of a refusal
-counts what it names, and that it says what to do. Everything goes through the command
+counts what it names, and which of its facts it has, such as a reason. Everything goes through the command
 line, files and names of `geomech`; a move of modules needs changes in `namespace` at
 most.
 """
@@ -32,9 +32,12 @@ import shutil
 import tempfile
 import warnings
 from collections.abc import Iterator
+from typing import NamedTuple
+from unittest import mock
 
 import commands
 import numpy as np
+from refusals import facts
 from words import (
     TOLERANCE,
     WORD,
@@ -48,6 +51,8 @@ from words import (
     of_file,
     text_holds,
 )
+
+from rft.core.refusal import Refusal
 
 DATA = pathlib.Path(__file__).parents[1] / "data"
 FOLDER = DATA / "frozen"
@@ -171,7 +176,8 @@ def differs(old: list[str], new: list[str]) -> str:
 
 # refusals.txt: under [a command, and the file that is changed] what is done to that,
 # under [geomech] whole commands, under [python] expressions; each with how it ends,
-# what its message names, and "cure" where that says what to do.
+# what its message names, which facts a `Refusal` has, and "cure" where other words of
+# it say what to do.
 
 CURES = """did you mean|must|such as|possible|takes?|use|give|say|add|put|write|raise
 |lower|widen|leave|drop|keep|choose|name|close|check|install|wait|start|turn|split|end
@@ -248,8 +254,37 @@ def edited(content: bytes, edits: str) -> bytes:
     return content
 
 
-def refused(section: str, case: str) -> tuple[str, str]:
-    """Return (exit code, or the error's class; the message) of a case."""
+class Refused(NamedTuple):
+    """How a case ends."""
+
+    code: str  # or the error's class
+    message: str
+    facts: list[str]
+
+    def has_cure(self) -> bool:
+        """Return whether the message says what to do, or what a value must be."""
+        if "instead" in self.facts:
+            return True
+        after_place = self.message.partition(": ")[2] or self.message
+        return bool(CURE.search(after_place))
+
+
+@contextlib.contextmanager
+def printed_refusals() -> Iterator[list[Refusal]]:
+    """Collect the refusals that become text within, the one that is printed last."""
+    found: list[Refusal] = []
+    as_line = Refusal.as_line
+
+    def noted(refusal: Refusal, spelled) -> str:
+        found.append(refusal)
+        return as_line(refusal, spelled)
+
+    with mock.patch.object(Refusal, "as_line", noted):
+        yield found
+
+
+def refused(section: str, case: str) -> Refused:
+    """Return how a case ends."""
     if section == "geomech":
         return ended(case)
     if section == "python":
@@ -266,23 +301,25 @@ def refused(section: str, case: str) -> tuple[str, str]:
         file.write_bytes(before)
 
 
-def raised(expression: str) -> tuple[str, str]:
-    """Return (the error's class, its message) of an expression."""
+def raised(expression: str) -> Refused:
+    """Return how an expression ends."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             eval(expression, namespace())
     except Exception as error:
         kind = next(c for c in type(error).__mro__ if c.__module__ == "builtins")
-        return kind.__name__, str(error)
-    return "nothing", ""
+        found = facts(error) if isinstance(error, Refusal) else []
+        return Refused(kind.__name__, str(error), found)
+    return Refused("nothing", "", [])
 
 
-def ended(line: str) -> tuple[str, str]:
-    """Return (exit code, message) of a command; with the code what a refusal should not
-    do beside its one line."""
+def ended(line: str) -> Refused:
+    """Return how a command ends; with the code what a refusal should not do beside its
+    one line."""
     before = files()
-    code, out, err = geomech(*shlex.split(line))
+    with printed_refusals() as refusals:
+        code, out, err = geomech(*shlex.split(line))
     lines = masked(err).splitlines()
     amiss = {
         "prints": out,
@@ -295,7 +332,8 @@ def ended(line: str) -> tuple[str, str]:
         if found:
             ends.append(what)
     message = " ".join(line for line in lines if line.startswith("error: "))
-    return " and ".join(ends), message
+    found = facts(refusals[-1]) if refusals else []
+    return Refused(" and ".join(ends), message, found)
 
 
 def named(message: str, given: str) -> list[str]:
@@ -333,27 +371,31 @@ def is_part(word: str, others: set[str]) -> bool:
 
 def outcome(section: str, case: str) -> str:
     """Return a case's end as it is recorded."""
-    code, message = refused(section, case)
-    found = named(message, f"{section} {case}")
-    line = f"{code} {json.dumps(found, ensure_ascii=False)}"
-    if CURE.search(message.partition(": ")[2] or message):
-        return f"{line} cure"
-    return line
+    end = refused(section, case)
+    found = named(end.message, f"{section} {case}")
+    return f"{end.code} {json.dumps(found, ensure_ascii=False)} {told(end)}".rstrip()
+
+
+def told(end: Refused) -> str:
+    """Return what a case tells beside names, such as "where because instead"."""
+    cure = ["cure"] if end.has_cure() and "instead" not in end.facts else []
+    return " ".join([*end.facts, *cure])
 
 
 def still(recorded: str, section: str, case: str) -> str:
     """Return what of a case is not as it was, "" for nothing: its end, a name that is
-    named no more, a cure that is missing."""
-    code, message = refused(section, case)
+    named no more, its facts."""
+    end = refused(section, case)
     was, _, rest = recorded.partition(" ")
-    wanted, end = json.JSONDecoder().raw_decode(rest)
-    lost = [name for name in wanted if not is_named(name, message)]
-    if code != was:
-        return f"ends with {code} in place of {was}: {message}"
+    wanted, length = json.JSONDecoder().raw_decode(rest)
+    lost = [name for name in wanted if not is_named(name, end.message)]
+    facts_before = rest[length:].strip()
+    if end.code != was:
+        return f"ends with {end.code} in place of {was}: {end.message}"
     if lost:
-        return f"does not name {', '.join(lost)}: {message}"
-    if rest[end:] and not CURE.search(message):
-        return f"says no cure: {message}"
+        return f"does not name {', '.join(lost)}: {end.message}"
+    if told(end) != facts_before:
+        return f"tells {told(end)!r} in place of {facts_before!r}: {end.message}"
     return ""
 
 

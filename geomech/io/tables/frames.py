@@ -91,7 +91,7 @@ def _pose(stored: Stored, frame: str, chain: Any) -> tuple[np.ndarray, np.ndarra
     if chain is None or stored.frame != chain.frame:
         cure = f"remove frame, or use {MINIMUM_PERTURBATION!r}"
         if chain is None:
-            cure += ", or add [system.body]in the frame of A"
+            cure += ", or add [system.body] in the frame of A"
         raise Refusal(
             f"a table in the frame {stored.frame!r} cannot be converted to the "
             f"frame {frame!r}",

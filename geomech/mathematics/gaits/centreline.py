@@ -3,7 +3,6 @@ period of them."""
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -17,7 +16,7 @@ from geomech.io.rows import LARGEST_NUMBER
 from geomech.mathematics.gaits import frames, midline
 from geomech.mathematics.geometry.gait import GAITS, LARGEST, Gait
 from rft.core.checks import Number, unmasked
-from rft.core.notes import Note
+from rft.core.notes import warn
 from rft.core.refusal import Refusal
 
 LARGEST_GAP = 0.25  # of the period, between neighbouring frames
@@ -201,13 +200,12 @@ class Centreline(Gait):
         if self.frequency and data.timed:
             cycles = period * self.frequency
             if abs(cycles - 1) > FREQUENCY_TOLERANCE:
-                warnings.warn(
+                warn(
                     f"{data.name}: the period is {period:.4g} in t, but frequency = "
                     f"{self.frequency:g} Hz makes it {1 / self.frequency:.4g} s: "
                     "correct one of them if t is in s; otherwise name the column "
                     "frame or phase",
                     UnitWarning,
-                    stacklevel=5,
                 )
 
         # One or two modes make no travelling wave.
@@ -218,12 +216,10 @@ class Centreline(Gait):
         size = max((np.abs(harmonic) ** 2).mean(), 1e-300)
         lag = np.imag(harmonic[:-1].conj() @ harmonic[1:]) / size  # rad, from the tail
         if lag < -BACKWARDS:
-            warnings.warn(
+            warn(
                 f"{data.name}: the wave runs from the tail to the head, which drives "
                 "the body backwards: if the animal swam forwards, give the points "
-                "from the tail to the head, with s = 0 at the tail",
-                Note,
-                stacklevel=5,
+                "from the tail to the head, with s = 0 at the tail"
             )
 
     def unit(self, t: ArrayLike) -> np.ndarray:

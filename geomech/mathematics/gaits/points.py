@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from geomech.mathematics.geometry.gait import GAITS, Gait, finite_array
 from rft.core.checks import unmasked
-from rft.core.notes import Note
+from rft.core.notes import warn
 from rft.core.refusal import Refusal
 
 LARGEST_BULGE = 1 / 20  # of the size of a polygon: a larger one of the spline is noted
@@ -97,13 +96,11 @@ class Points(Gait):
         """Warn (`Note`) where the spline leaves the polygon through its points."""
         bulge = self.bulge
         if bulge > LARGEST_BULGE:
-            warnings.warn(
+            warn(
                 f"[gait] points: the spline through {len(self.points)} shapes departs "
                 f"from the polygon through them by {100 * bulge:.0f} % of its size: "
                 "for straight sides use kind = 'polygon'; for a smooth curve give "
-                "more points",
-                Note,
-                stacklevel=4,
+                "more points"
             )
 
     def unit(self, t: ArrayLike) -> np.ndarray:

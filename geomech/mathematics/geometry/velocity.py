@@ -4,7 +4,6 @@ The check comes before thousands of velocities are computed."""
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -13,6 +12,7 @@ from numpy.typing import ArrayLike
 from geomech.core.errors import VelocityWarning
 from geomech.mathematics.geometry.periods import Periods, periodic_axes
 from rft.core.checks import masked_arrays, real_array
+from rft.core.notes import warn
 from rft.core.refusal import Refusal
 
 Velocity = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -72,9 +72,7 @@ def checked_velocity(
                 f"{periods[k]:.6g} of alpha_{k + 1}"
             )
     if faults:
-        warnings.warn(
-            f"this velocity {'; it '.join(faults)}", VelocityWarning, stacklevel=3
-        )
+        warn(f"this velocity {'; it '.join(faults)}", VelocityWarning)
     return velocity
 
 

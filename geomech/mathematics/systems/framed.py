@@ -260,6 +260,6 @@ def formula(system: System) -> tuple[Any, tuple[Any, ...]]:
     if symbolic is None:
         raise Refusal(
             f"no formula is known for the connection of a {kind_of(system)}",
-            because="use 'geomech connection' for its numerical values",
+            instead="use 'geomech connection' for its numerical values",
         )
     return symbolic.symbolic()

@@ -6,7 +6,6 @@ parameters, are classes below `Swimmer`; `Swimmer.capability` returns them."""
 from __future__ import annotations
 
 import dataclasses
-import warnings
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
@@ -53,6 +52,7 @@ from rft.contacts import (
     Touching,
 )
 from rft.core.checks import unmasked
+from rft.core.notes import warn
 from rft.core.premise import SHAPE_ALONE, Premise
 from rft.core.refusal import Refusal, located, require
 from rft.effects import EFFECTS
@@ -733,11 +733,10 @@ def note_radius(swimmer: Swimmer) -> None:
         if has_links:
             link = min(links) if radius > min(links) else max(links)
             whole = f"a link of {size * link:.3g} {unit}"
-        warnings.warn(
+        warn(
             f"end-caps have a radius of {size * radius:.3g} {unit} on {whole}: is the "
             "radius in another unit?",
             UnitWarning,
-            stacklevel=4,
         )
 
 

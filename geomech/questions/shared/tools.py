@@ -1,6 +1,5 @@
 """Functions that several questions share."""
 
-import warnings
 from collections.abc import Iterable
 from dataclasses import fields
 from functools import partial
@@ -13,7 +12,7 @@ from geomech.core.errors import choose
 from geomech.core.variables import COMPONENTS, Result, Variable, same_or_each
 from geomech.questions.shared import base
 from rft.core.checks import is_number
-from rft.core.notes import Note
+from rft.core.notes import warn
 from rft.core.refusal import Refusal, in_line
 
 FILMS = (".gif", ".mp4")
@@ -82,7 +81,7 @@ def warn_of_notes(result: Result) -> None:
     """Warn in Python of what a command prints as notes."""
     if "note" in result:
         for line in result["note"].values.tolist():
-            warnings.warn(line, Note, stacklevel=4)
+            warn(line)
 
 
 def side_by_side(result: Result, name: str, dim: str, names: Iterable[str]) -> Variable:

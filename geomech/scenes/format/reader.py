@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +27,7 @@ from geomech.scenes.format.sections import (
     variant_of,
 )
 from geomech.scenes.format.sizes import Sizes
+from rft.core.notes import warn
 from rft.core.refusal import Refusal, located
 from rft.core.registry import Registry
 
@@ -307,7 +307,7 @@ def _check_degrees(place: str, value) -> None:
             f"{place} = {value:g} is less than one degree: if the value is in rad, "
             f"write gamma0 = {value:g}"
         )
-        warnings.warn(text, UnitWarning, stacklevel=2)
+        warn(text, UnitWarning)
 
 
 def _radians(degrees: Any) -> Any:

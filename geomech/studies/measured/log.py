@@ -4,7 +4,6 @@ row."""
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +15,7 @@ from geomech.core.errors import UnitWarning
 from geomech.io.rows import UNITS, Rows, plain, split_unit
 from geomech.io.rows import read as read_rows
 from geomech.io.tables.base import LARGEST_ANGLE
+from rft.core.notes import warn
 from rft.core.refusal import Refusal, formatted
 
 LARGEST_FILE = 100_000_000  # bytes
@@ -362,11 +362,10 @@ def _check_units(log: Log, picked: Sequence[str], turn: np.ndarray) -> None:
     size = np.degrees(np.abs(log.alpha).max())
     are_degrees = (turn[1:-3] != 1.0).all()
     if are_degrees and size < 2 * np.pi:
-        warnings.warn(
+        warn(
             f"{log.name}: joint angles are at most {size:.3g} degrees: remove "
             "``degrees`` if they are in rad",
             UnitWarning,
-            stacklevel=3,
         )
 
 

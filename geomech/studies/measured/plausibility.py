@@ -3,8 +3,6 @@ left-handed frame."""
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 
 from geomech.core.errors import UnitWarning
@@ -12,6 +10,7 @@ from geomech.mathematics.geometry.representations.tube import Loop
 from geomech.studies.measured import regression
 from geomech.studies.measured.log import Log
 from geomech.studies.measured.smooth import Smoothed
+from rft.core.notes import warn
 
 # Rad of the heading per rad of the joints, rms: no link turns much faster than its
 # joints.
@@ -56,7 +55,7 @@ def note_units(
             "convert it if it is in ms or counts frames"
         )
     for line in notes:
-        warnings.warn(f"{log.name}: {line}", UnitWarning, stacklevel=3)
+        warn(f"{log.name}: {line}", UnitWarning)
 
 
 def _rms(rates: np.ndarray) -> float:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import warnings
 
 import mujoco
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from rft.core.notes import Note
+from rft.core.notes import warn
 from rft.core.refusal import Refusal, formatted, located, require
 from rft.terradynamics.meshes.surfaces import shapes, widened
 from rft.terradynamics.meshes.surfaces.merged import resize_faces
@@ -185,7 +184,7 @@ def _model_mesh(model: mujoco.MjModel, k: int) -> Mesh:
         mesh, notes = sound(_mesh_vertices(model, k), faces, cure="close it")
     notes = [*notes, *size_note(mesh, "is the scale of its asset correct?")]
     if notes:
-        warnings.warn(f"mesh {formatted(name)}: {'; '.join(notes)}", Note, stacklevel=2)
+        warn(f"mesh {formatted(name)}: {'; '.join(notes)}")
     return mesh
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from rft.core.metres import LARGEST
-from rft.core.notes import Note
+from rft.core.notes import warn
 from rft.core.refusal import Refusal, formatted, located, require
 from rft.terradynamics.meshes.surfaces.mesh import Mesh, require_vertices
 from rft.terradynamics.meshes.surfaces.sound import OPEN_CURE, size_note, sound
@@ -60,7 +60,7 @@ def read(path, closed: bool = True, scale: float = 1.0) -> Mesh:
         mesh, notes = sound(vertices * scale, faces, closed, OPEN_CURE)
     notes = [*notes, *size_note(mesh, f"is scale = {scale:g} correct?")]
     if notes:
-        warnings.warn(f"{path}: {'; '.join(notes)}", Note, stacklevel=2)
+        warn(f"{path}: {'; '.join(notes)}")
     return mesh
 
 

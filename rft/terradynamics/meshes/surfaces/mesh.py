@@ -86,7 +86,7 @@ class Mesh:
         require(
             not flat,
             f"{flat} of {len(faces)} triangles have no area",
-            because="clean the mesh",
+            instead="clean the mesh",
         )
         if self.closed:
             self._require_closed()

@@ -150,10 +150,11 @@ class _Mender:
         """Leave out triangles with equal corners, which close nothing."""
         proper = _proper(self.faces)
         n_dropped = len(self.faces) - len(proper)
+        has_area = len(proper) > 0 and not self.is_flat(proper).all()
         require(
-            len(proper) > 0,
-            f"{n_dropped} of {len(self.faces)} triangles have no area",
-            because="clean the mesh",
+            has_area,
+            f"{len(self.faces)} of {len(self.faces)} triangles have no area",
+            instead="clean the mesh",
         )
         self.faces = proper
         self.note(n_dropped, "triangle", "without area left out")

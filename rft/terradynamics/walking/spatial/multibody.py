@@ -355,7 +355,7 @@ def _remove_contacts(model: mujoco.MjModel, surfaces: Sequence[Surface]) -> None
     is_paired = in_sand[model.pair_geom1] | in_sand[model.pair_geom2]
     require(
         not is_paired.any(),
-        "a <pair> of <contact> names a geom that touches the groundand nothing else",
+        "a <pair> of <contact> names a geom that touches only the ground",
         instead="remove it",
     )
 
