@@ -256,14 +256,18 @@ def test_a_picture_of_a_file_is_that_of_the_result(result, tmp_path):
             np.testing.assert_array_equal(a.get_xydata(), b.get_xydata())
 
 
+# Of results without a stretched shape space, and of swimmers.
+REFUSED_SWITCHES = {"stretch": "was not computed", "maps": "robots that walk"}
+
+
 def test_every_switch_of_a_picture_draws_or_is_refused(result, tmp_path):
-    """The command writes what it draws. These results have no stretched shape space."""
+    """The command writes what it draws."""
     if result.question.draw is None:
         pytest.skip("there is none")
     for name, (_, kind, _) in declaration(type(result.question)).picture.items():
-        if name == "stretch":
-            with pytest.raises(Refusal, match="was not computed"):
-                result.plot(stretch=True)
+        if name in REFUSED_SWITCHES:
+            with pytest.raises(Refusal, match=REFUSED_SWITCHES[name]):
+                result.plot(**{name: True})
         elif kind is bool:
             drawn = result.plot(**{name: True})
             assert drawn.axes, name
