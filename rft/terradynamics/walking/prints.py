@@ -43,8 +43,8 @@ class PrintedGround(GroundEffect):
     places (m): x of earlier intrusions, across the whole ground; by default none.
 
     Experiments show that drag and penetration forces fall substantially close to
-    disturbed ground (paper Sec. IV B), which Mazouchova et al. (2013) take for the
-    cause of a robot's failure. The form and its numbers are assumed, as is that
+    disturbed ground, which was posited to be the cause of locomotor failure (paper
+    Sec. IV B). The form and its numbers are assumed, as is that
     disturbances neither add up nor heal, that the ground stays level, and that one
     factor stands for all directions.
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import difflib
 import hashlib
-import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
@@ -14,7 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from rft.core.checks import in_range, real_array
-from rft.core.notes import Note
+from rft.core.notes import warn
 from rft.core.refusal import Refusal, formatted, located, require
 from rft.terradynamics.walking.robot import Robot
 from rft.terradynamics.walking.spatial.facets import Surface
@@ -68,7 +67,7 @@ class Mjcf(Robot):
         object.__setattr__(self, "digest", digest)
         object.__setattr__(self, "model", model)
         for note in self._find_geoms():
-            warnings.warn(f"{self.mjcf}: {note}", Note, stacklevel=3)
+            warn(f"{self.mjcf}: {note}")
         self._find_driven()
 
     def _check_names(self, field_name: str) -> None:
