@@ -274,6 +274,15 @@ class Recorded(Protocol):
         """Return the attributes by name."""
 
 
+@runtime_checkable
+class Noted(Protocol):
+    """A model that its user may not know in detail; read by `geomech explain`.
+
+    notes: facts about it, a line each."""
+
+    notes: tuple[str, ...]
+
+
 def stored_table(system: System, name: str) -> Any:
     """Return the table of that name that a system interpolates; None where tables are
     computed."""

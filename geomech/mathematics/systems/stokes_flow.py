@@ -25,6 +25,7 @@ from rft.bodies import Chain
 from rft.bodies.base import Length, body_size, is_reversible
 from rft.core.checks import Number, check_numbers, unmasked
 from rft.core.refusal import Refusal
+from rft.formulas.cylinders import drag_ratio
 from rft.hydrodynamics import (
     Beads,
     FluidModel,
@@ -35,7 +36,7 @@ from rft.hydrodynamics import (
     resistance,
 )
 from rft.hydrodynamics.beads import MOST_SLENDER as MOST_BEADS
-from rft.hydrodynamics.stokeslets import MOST_SLENDER, most_segments
+from rft.hydrodynamics.stokeslets import BLOB, MOST_SLENDER, most_segments
 from rft.hydrodynamics.stokeslets import SHORTEST_SEGMENT as SHORTEST
 
 LEAST_SLENDER = 5.0
@@ -204,6 +205,15 @@ class StokesFlow:
         )
 
     @property
+    def _nonlocal_notes(self) -> tuple[str, ...]:
+        """How the straight body compares with a local law."""
+        rigid = self.resistance(np.zeros((1, self.joints))).rigid[0]
+        return (
+            f"straight: drag across over drag along {rigid[1, 1] / rigid[0, 0]:.3f}; "
+            f"a cylinder of this slenderness has {drag_ratio(self.slenderness):.3f}",
+        )
+
+    @property
     def balance_size(self) -> BalanceSize:
         """Size of the balance of one shape."""
         n = len(self.model.sites(self._chain.fractions).link)
@@ -236,21 +246,44 @@ class BeadSwimmer(StokesFlow):
     array([-0.0018, -0.0035, -0.0829])
     """
 
+    slenderness: Annotated[
+        float,
+        Number(
+            LEAST_SLENDER,
+            MOST_BEADS,
+            "-",
+            "length of the body over its diameter, 5 to 1000: the number of beads",
+        ),
+    ] = 48.0
+
     kind = "bead-swimmer"
     seconds_per_pair: ClassVar[float] = 1e-7
-
-    def __post_init__(self):
-        super().__post_init__()
-        if self.slenderness > MOST_BEADS:
-            raise Refusal(
-                f"{self.slenderness:g} beads are too many",
-                instead=f"lower slenderness to {MOST_BEADS:g}, or use the kind "
-                f"{StokesletSwimmer.kind!r}",
-            )
 
     @property
     def model(self) -> Beads:
         return Beads(self.slenderness)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the beads are, and where they overlap."""
+        sites = self.model.sites(self._chain.fractions)
+        spacing = 2 * sites.half * self.slenderness
+        numbers = np.bincount(sites.link)
+        distance = "touching on straight links"
+        if np.ptp(spacing) > 1e-9 or abs(spacing[0] - 1) > 1e-9:
+            distance = (
+                f"{spacing.min():.3g} to {spacing.max():.3g} diameters apart, as links "
+                "are no whole number of diameters long"
+            )
+        return (
+            f"beads: {', '.join(map(str, numbers))} on the links, {distance}; their "
+            "number is the model and has no numerical error",
+            "joints: where a joint bends, the last bead of a link and the first of the "
+            "next overlap, with the mobility of overlapping spheres. Three equal links "
+            "with a bead on each joint instead swim 0.8 % less on the circle of 1 rad "
+            "at slenderness 48, and 1.7 % less at 24",
+            *self._nonlocal_notes,
+        )
 
     @classmethod
     def examples(cls) -> dict[str, BeadSwimmer]:
@@ -317,6 +350,21 @@ class StokesletSwimmer(StokesFlow):
     @property
     def model(self) -> Stokeslets:
         return Stokeslets(self.slenderness, self._n_segments * len(self.lengths))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the segments are, and how they are matched to a cylinder."""
+        sites = self.model.sites(self._chain.fractions)
+        numbers = np.bincount(sites.link)
+        return (
+            f"Stokeslets: {', '.join(map(str, numbers))} segments on the links; errors "
+            "include the difference from twice as many",
+            f"radius: a force is spread over a ball of {BLOB:.3g} radii of the link, "
+            "which gives a long straight link the drag of a cylinder along and across",
+            "joints: links end in one point, around which their balls overlap; nothing "
+            "is left out",
+            *self._nonlocal_notes,
+        )
 
     def refined(self) -> StokesletSwimmer:
         """Return the swimmer with twice the segments."""
