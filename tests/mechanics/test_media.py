@@ -16,6 +16,7 @@ from rft import (
     Coulomb,
     Granular,
     Surface,
+    Viscous,
     body_velocity,
     time_steps,
 )

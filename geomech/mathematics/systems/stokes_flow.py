@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -96,7 +97,7 @@ class StokesFlow:
     def joints(self) -> int:
         return len(self.lengths) - 1
 
-    @property
+    @cached_property
     def _chain(self) -> Chain:
         return Chain(self.lengths, self.length, self.frame)
 
