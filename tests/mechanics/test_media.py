@@ -16,6 +16,7 @@ from rft import (
     Coulomb,
     Granular,
     Surface,
+    Viscous,
     body_velocity,
     time_steps,
 )
@@ -261,3 +262,12 @@ def test_only_media_of_one_form_share_a_batch():
     for others in (Coulomb(), CubicDrag()):
         with pytest.raises(ValueError, match="must be of one law"):
             batched_medium([Granular(1.8, 0.24), others], [1, 1])
+
+
+def test_a_slender_body_has_the_ratio_of_a_straight_cylinder():
+    """1.50 at 25 (Tirado et al. 1984), and 2 for an infinite one."""
+    ratios = [Viscous(slenderness=p).ratio for p in (2, 5, 25, 100, 1e6)]
+    assert (np.diff([1.0, *ratios, 2.0]) > 0).all()
+    assert abs(ratios[2] - 1.50) < 0.005
+    thin = Viscous(slenderness=25)
+    assert thin.traction(0.3, 0.7) == Viscous(ratios[2]).traction(0.3, 0.7)

@@ -23,7 +23,7 @@ from figures.paper import (
     fig11d_ccf,
     fig11e_displacement,
 )
-from figures.swimmers import compliance, frames_area
+from figures.swimmers import compliance, fluid_models, frames_area
 from geomech.scenes import load
 from geomech.studies.scene_tables import SceneTables
 
@@ -87,6 +87,13 @@ CURVES = [
         2,
         "$A$ = 1 rad",
         lambda found: found["cable"]["x"][0],
+    ),
+    (
+        fluid_models,
+        {"amplitudes": (0.5, 1.0), "slendernesses": (24, 48), "segments": (4, 8)},
+        0,
+        "touching beads",
+        lambda found: found["by_amplitude"]["touching beads"],
     ),
 ]
 

@@ -22,7 +22,11 @@ from functools import cached_property, partial
 import numpy as np
 
 from geomech.core.work import Map, each
-from geomech.mathematics.geometry.connection import SAMPLES_TOGETHER, directions
+from geomech.mathematics.geometry.connection import (
+    SAMPLES_TOGETHER,
+    directions,
+    sign_changes,
+)
 from geomech.mathematics.geometry.gait import Gait, checked_gait
 from geomech.mathematics.geometry.periods import Periods
 from geomech.mathematics.geometry.representations.field import Field, as_axes
@@ -137,12 +141,15 @@ def fit(
     progress: Callable | None = None,
     map: Map = each,
     periods: Periods = (),
+    singularity: Callable | None = None,
 ) -> Metric:
     """Fit M on the grid spanned by ``axes`` exactly, from d (d + 1) / 2 powers at each
     shape.
 
     power(alpha, alphadot) -> (...,), quadratic in alphadot. periods: of the shape
-    variables; the axis of one with a period covers it (`connection.grid`).
+    variables; the axis of one with a period covers it (`connection.grid`). singularity:
+    a function of shapes that passes through 0 where the power does not exist; M is nan
+    where A is (`connection.fit`).
 
     Examples
     --------
@@ -161,7 +168,11 @@ def fit(
     i, j = np.triu_indices(d)
     # One joint at a time, and each two at once.
     unit = np.eye(d)[i] + np.where(i == j, 0.0, 1.0)[:, None] * np.eye(d)[j]
-    P = _sampled(power, axes, unit, progress, map)  # (C, N...)
+    masked = singularity is not None
+    P = _sampled(power, axes, unit, progress, map, masked)  # (C, N...)
+    if singularity is not None:
+        alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
+        P = np.where(sign_changes(singularity(alpha), periods), np.nan, P)
     M = np.empty((d, d, *P.shape[1:]))
     for c in np.flatnonzero(i == j):
         M[i[c], i[c]] = P[c]
@@ -240,15 +251,22 @@ def norm_from_samples(
 
 
 def _sampled(
-    power: Power, axes, unit: np.ndarray, progress: Callable | None, map: Map
+    power: Power,
+    axes,
+    unit: np.ndarray,
+    progress: Callable | None,
+    map: Map,
+    masked: bool = False,
 ) -> np.ndarray:
-    """Return (C, N_1, ..., N_d): powers at every shape for the rates ``unit`` (C,
-    d)."""
+    """Return (C, N_1, ..., N_d): powers at every shape for the rates ``unit`` (C, d).
+    masked: they may be nan."""
     alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 1, len(axes))
     n = len(alpha)
     step = max(1, SAMPLES_TOGETHER // len(unit))
     parts = [slice(k, min(k + step, n)) for k in range(0, n, step)]
-    results = map(partial(_powers, (power, unit)), [alpha[part] for part in parts])
+    results = map(
+        partial(_powers, (power, unit, masked)), [alpha[part] for part in parts]
+    )
     P = np.empty((len(unit), n))
     for part, powers in zip(parts, results):
         P[:, part] = powers.T
@@ -258,10 +276,12 @@ def _sampled(
 
 
 def _powers(shared: tuple, alpha: np.ndarray) -> np.ndarray:
-    """Return the powers (s, C) at some shapes. shared: (power, unit)."""
-    power, unit = shared
+    """Return the powers (s, C) at some shapes. shared: (power, unit, whether powers may
+    be nan)."""
+    power, unit, masked = shared
     powers = np.asarray(power(alpha, unit))
-    if powers.shape != (len(alpha), len(unit)) or not np.isfinite(powers).all():
+    is_finite = masked or np.isfinite(powers).all()
+    if powers.shape != (len(alpha), len(unit)) or not is_finite:
         raise Refusal(
             f"power must be finite, of shape {(len(alpha), len(unit))} for these rates",
             value=powers.shape,

@@ -19,6 +19,7 @@ from geomech.mathematics.systems.floating import FloatingChain
 from geomech.mathematics.systems.ideal_fluid import IdealFluidSwimmer
 from geomech.mathematics.systems.no_slip import NoSlipSnake
 from geomech.mathematics.systems.solver import Solver
+from geomech.mathematics.systems.stokes_flow import BeadSwimmer, StokesletSwimmer
 from geomech.mathematics.systems.swimmer import Swimmer
 from geomech.mathematics.systems.table import Table
 from rft.core.premise import Premise
@@ -30,6 +31,7 @@ KINDS = SYSTEMS
 __all__ = [
     "KINDS",
     "SYSTEMS",
+    "BeadSwimmer",
     "Cycle",
     "DifferentialDrive",
     "FloatingChain",
@@ -37,6 +39,7 @@ __all__ = [
     "NoSlipSnake",
     "Premise",
     "Solver",
+    "StokesletSwimmer",
     "Swimmer",
     "System",
     "Table",

@@ -199,13 +199,17 @@ class BalanceSize(NamedTuple):
     which forces are evaluated. pieces: per body length, into which effects that vary
     along elements cut these; 0 without such effects. memory: number of values that time
     stepping stores. batched: whether there is a parameter for each amplitude, so that
-    gaits are run together."""
+    gaits are run together. seconds: time of one balance, s, of a system whose velocity
+    is no closed form and that has no `Tunable` solver; None for others. all_rates:
+    whether one balance gives the velocities of a shape at all rates."""
 
     elements: int = 1
     evaluations: int = 1
     pieces: int = 0
     memory: int = 0
     batched: bool = False
+    seconds: float | None = None
+    all_rates: bool = False
 
 
 @runtime_checkable
@@ -270,6 +274,15 @@ class Recorded(Protocol):
         """Return the attributes by name."""
 
 
+@runtime_checkable
+class Noted(Protocol):
+    """A model that its user may not know in detail; read by `geomech explain`.
+
+    notes: facts about it, a line each."""
+
+    notes: tuple[str, ...]
+
+
 def stored_table(system: System, name: str) -> Any:
     """Return the table of that name that a system interpolates; None where tables are
     computed."""
@@ -313,6 +326,14 @@ def velocity_and_power(
         )
     xi = system.velocity(alpha, alphadot)
     return xi, dissipative.power(alpha, alphadot, xi)
+
+
+def balances_at_rates(system: System, n_rates: int) -> int:
+    """Return the number of balances for the velocities of one shape at a number of
+    rates."""
+    if system.traits.linear and balance_size(system).all_rates:
+        return 1
+    return n_rates
 
 
 def settling(system: System) -> float:

@@ -35,7 +35,7 @@ from geomech.mathematics.systems.base import (
     length_unit,
     shape_labels,
 )
-from geomech.mathematics.systems.capabilities import stored_table
+from geomech.mathematics.systems.capabilities import balances_at_rates, stored_table
 from geomech.mathematics.systems.framed import Framed
 from geomech.mathematics.tiers.base import Numerics, Table
 from rft.core.premise import ALL
@@ -117,7 +117,8 @@ def table(system: System, numerics: Numerics) -> Table:
     return Table(
         "connection",
         key=key(numerics, DEPENDS_ON),
-        balances=solved_shapes(solved, numerics, count) * count,
+        balances=solved_shapes(solved, numerics, count)
+        * balances_at_rates(solved, count),
         numbers=(d + 3) * 3 * numerics.grid**d,
         build=partial(_build, system, numerics),
         axes=partial(axes, system, numerics),
@@ -162,9 +163,9 @@ def without_field(system: System, numerics: Numerics) -> Callable:
 
 
 def balances_per_shape(system: System, numerics: Numerics) -> int:
-    """Return how many velocities `without_field` takes for each shape."""
+    """Return how many balances `without_field` takes for each shape."""
     if system.traits.linear:
-        return system.joints
+        return balances_at_rates(system, system.joints)
     return directions(system, numerics)
 
 
@@ -215,7 +216,8 @@ def plane_balances(
     )
     alpha = plane_shapes([axes[k] for k in indices(pair)], pair, np.asarray(at))
     symmetries = plane_images(alpha, count, system.traits, pair)
-    return int(to_solve(symmetries, alpha[..., 0].size).sum()) * count
+    n_shapes = int(to_solve(symmetries, alpha[..., 0].size).sum())
+    return n_shapes * balances_at_rates(system, count)
 
 
 def solved_shapes(system: System, numerics: Numerics, count: int) -> int:

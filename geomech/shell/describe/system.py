@@ -10,6 +10,7 @@ from geomech.io.tables.base import SIGNS
 from geomech.io.tables.sysplotter import compared
 from geomech.mathematics.systems import Swimmer, Table
 from geomech.mathematics.systems.base import System, WrappedSystem, kind_of
+from geomech.mathematics.systems.capabilities import Noted, capability
 from geomech.mathematics.systems.framed import NAME, Framed
 from geomech.mathematics.systems.swimmer import effect_sizes, name_in
 from rft.bodies import BODIES
@@ -19,9 +20,11 @@ from rft.core.refusal import formatted, in_line
 from rft.effects import EFFECTS, ENGINES
 from rft.effects import engine as engine_of
 from rft.effects.base import Effect
+from rft.formulas.cylinders import drag_ratio
 from rft.formulas.quadrature import QUADRATURE
-from rft.laws import LAWS
+from rft.laws import LAWS, Medium, Viscous
 from rft.laws.records import record
+from rft.laws.viscous import LIMIT
 
 NO_PREMISE_BROKEN = "no memory, no dependence on place, no mass"
 
@@ -43,9 +46,11 @@ def system_lines(system: System) -> list[str]:
             value = getattr(system, field.name)
             if value is not None:
                 entries.append(f"{field.name} = {formatted(value)}")
-    if not entries:
-        return [kind_of(system)]
-    return [f"{kind_of(system)} ({', '.join(entries)})"]
+    first = kind_of(system)
+    if entries:
+        first = f"{first} ({', '.join(entries)})"
+    noted = capability(system, Noted)
+    return [first, *(() if noted is None else noted.notes)]
 
 
 def engine(system: System) -> str:
@@ -90,7 +95,12 @@ def swimmer_lines(system: Swimmer) -> list[str]:
     """Return medium and body, notes, the effects that are on and off, and the back
     end."""
     law = name_in(LAWS, system.medium)
-    lines = [medium_and_body(system, ", "), *contact_lines(system), *notes(system)]
+    lines = [
+        medium_and_body(system, ", "),
+        *viscous_lines(system.medium),
+        *contact_lines(system),
+        *notes(system),
+    ]
     for effect in system.effects:
         lines += effect_lines(effect, system)
     used = {effect.kind for effect in system.effects}
@@ -100,6 +110,29 @@ def swimmer_lines(system: Swimmer) -> list[str]:
         *lines,
         f"off (not evaluated): {', '.join(off) or 'none'}",
         f"back end: {system.solver.computed(law_record, law)}",
+    ]
+
+
+def viscous_lines(medium: Medium) -> list[str]:
+    """Return how far a viscous law is from a flow between links."""
+    if type(medium) is not Viscous:
+        return []
+    if medium.slenderness is not None:
+        return [
+            "viscous: the ratio is that of a straight cylinder (Tirado et al. 1984, "
+            "for slenderness 2 to 30, extrapolated beyond). On the circle of 1 rad "
+            "three equal links swim 13 to 15 % less with it than as touching beads, "
+            "at slenderness 24 to 200"
+        ]
+    if medium.ratio != LIMIT:
+        return []
+    ratios = [f"{drag_ratio(p):.2f} at slenderness {p}" for p in (10, 50, 200)]
+    return [
+        f"viscous: a ratio of {LIMIT:g} is the limit of an infinitely thin body; a "
+        f"straight cylinder has {', '.join(ratios)} ([medium] slenderness). On the "
+        "circle of 1 rad three equal links swim 66 %, 46 % and 28 % more with this "
+        "ratio than as touching beads at slenderness 24, 48 and 200 (geomech explain "
+        "three-link-beads)"
     ]
 
 

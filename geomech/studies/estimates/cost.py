@@ -25,6 +25,7 @@ from geomech.mathematics.geometry.connection import (
 from geomech.mathematics.systems.base import System
 from geomech.mathematics.systems.capabilities import (
     balance_size,
+    balances_at_rates,
     gaits_per_batch,
     pieces_per_length,
     refined,
@@ -93,11 +94,17 @@ def total_cost(jobs: Sequence[Job]) -> Cost:
     solved = [job for job in jobs if solver_of(job.scene.system) is not None]
     n_closed = sum(job.count for job in jobs) - sum(job.count for job in solved)
     besides = sum(job.besides for job in jobs) + SECONDS_PER_CLOSED_FORM * n_closed
+    besides += sum(job.count * _seconds_of_balance(job.scene.system) for job in jobs)
     numpy_seconds = sum(job.seconds("numpy") for job in solved)
     with prefer_backend(numpy_seconds):
         seconds = sum(job.seconds() for job in solved) + besides
     memory = max((job.memory for job in jobs), default=BASE)
     return Cost(count, seconds, memory, besides, numpy_seconds)
+
+
+def _seconds_of_balance(system: System) -> float:
+    """Return the seconds of a balance of a system that knows them; 0 for others."""
+    return balance_size(system).seconds or 0.0
 
 
 def study_jobs(
@@ -306,7 +313,8 @@ def even_part_jobs(scene: Scene) -> list[Job]:
     n_solved = EVEN_SHAPES
     if not system.traits.odd:
         n_solved += n_shapes
-    count = 2 * n_solved * EVEN_DIRECTIONS * system.joints
+    n_rates = balances_at_rates(system, EVEN_DIRECTIONS * system.joints)
+    count = 2 * n_solved * n_rates
     return field_jobs(scene, count, BASE + 8 * TABLE_COPIES * 3 * n_shapes)
 
 
@@ -339,7 +347,8 @@ def metric_jobs(scene: Scene) -> list[Job]:
     n_shapes = np.prod([len(axis) for axis in fitted.axes(system, numerics)])
     n_numbers = max(system.joints**2, effort.HIGHEST_HARMONIC + 1)
     memory = BASE + 8 * TABLE_COPIES * float(n_shapes * n_numbers)
-    return field_jobs(scene, float(n_shapes * n_rates), memory)
+    n_balances = n_shapes * balances_at_rates(system, n_rates)
+    return field_jobs(scene, float(n_balances), memory)
 
 
 def effort_jobs(scene: Scene, count: int, gait: Gait | None = None) -> list[Job]:

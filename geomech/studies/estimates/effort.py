@@ -133,11 +133,16 @@ def fit_metric(
     degree = numerics.interpolation
     periods = system.traits.periods
     own = capability(system, OwnMetric)
-    if own is not None:
-        return metric.fit(own.squared_speed, grid, degree, progress, periods=periods)
-    if is_quadratic(system):
-        power_of = partial(power, system)
-        return metric.fit(power_of, grid, degree, progress, periods=periods)
+    if own is not None or is_quadratic(system):
+        power_of = partial(power, system) if own is None else own.squared_speed
+        return metric.fit(
+            power_of,
+            grid,
+            degree,
+            progress,
+            periods=periods,
+            singularity=system.traits.singularity,
+        )
     norm = partial(_norm_at, system)
     count = harmonic.directions(system, numerics)
     return metric.fit_norm(

@@ -47,18 +47,19 @@ def diagnosed_velocity(system: System, alpha, alphadot) -> dict:
     alphadot = _checked_numbers(system, "alphadot", alphadot)
     note_angles(system, np.abs(alpha).max())
     traits = system.traits
-    if traits.singularity is not None and not traits.singularity(alpha):
-        raise Refusal(
-            "the shape is singular", because=traits.singular, instead="move a joint"
-        )
+    singular = Refusal(
+        "the shape is singular", because=traits.singular, instead="move a joint"
+    )
+    has_singular = traits.singularity is not None
+    if has_singular and not traits.singularity(alpha):
+        raise singular
     diagnosed = capability(system, Diagnosed)
     if diagnosed is not None:
         return diagnosed.diagnosed(alpha, alphadot)
-    return {
-        "xi": evaluate(system.velocity, alpha, alphadot).tolist(),
-        "status": "exact",
-        "residual": 0.0,
-    }
+    xi = evaluate(system.velocity, alpha, alphadot, masked=has_singular)
+    if np.isnan(xi).any():
+        raise singular
+    return {"xi": xi.tolist(), "status": "exact", "residual": 0.0}
 
 
 def _checked_numbers(system: System, name: str, x) -> np.ndarray:
