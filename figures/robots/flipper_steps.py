@@ -39,9 +39,14 @@ LEG_CYCLES = 15
 
 
 def flipper_steps(
-    weakening: float, radius: float = 1.0, sweep: float | None = None, **sizes
+    cycles: int,
+    weakening: float,
+    radius: float = 1.0,
+    sweep: float | None = None,
+    **sizes,
 ) -> np.ndarray:
-    """Return the progress in each cycle (C,), m. radius: over that of the scene."""
+    """Return the progress in each cycle (C,), m, 0 after the robot's end. radius: over
+    that of the scene. sweep: degrees."""
     scene = load("flipper-robot")
     (effect,) = scene.effects
     ground = PrintedGround(radius * effect.radius, weakening)
@@ -50,8 +55,8 @@ def flipper_steps(
         gait = dataclasses.replace(gait, sweep=math.radians(sweep))
     robot = dataclasses.replace(scene.robot, **sizes)
     walker = Walker(robot, gait, scene.medium, (ground,))
-    (walk,) = engine("mujoco").walk([walker], ROUGH, CYCLES)
-    lengths = np.zeros(CYCLES)
+    (walk,) = engine("mujoco").walk([walker], ROUGH, cycles)
+    lengths = np.zeros(cycles)
     lengths[: len(walk.step_length)] = walk.step_length
     return lengths
 
@@ -67,55 +72,75 @@ def sandbot_speed(rate: float, strength: float, weakening: float) -> float:
     return walk.speed
 
 
-def compute() -> dict:
-    scene = load("flipper-robot")
-    weakening = scene.effects[0].weakening
+def compute(
+    cycles: int = CYCLES,
+    shown: tuple = SHOWN_DEPTHS,
+    depths: tuple = DEPTHS,
+    sweeps: tuple = SWEEPS,
+    weakenings: tuple = WEAKENINGS,
+    radii: tuple = RADII,
+    rates: tuple = RATES,
+    strengths: tuple = STRENGTHS,
+) -> dict:
+    """Return progress by wrist and depth, sweep or radius, and speeds of SandBot by
+    strength and weakening, with the values that they belong to."""
+    weakening = load("flipper-robot").effects[0].weakening
     steps = {}
-    depths = {}
-    weak = {}
+    by_depth = {}
+    by_weakening = {}
     for wrist in WRISTS:
-        for depth in SHOWN_DEPTHS:
-            steps[wrist, depth] = flipper_steps(weakening, wrist=wrist, depth=depth)
-        for sweep in SWEEPS:
-            depths[wrist, sweep] = [
-                flipper_steps(weakening, sweep=sweep, wrist=wrist, depth=depth)
-                for depth in DEPTHS
+        for depth in shown:
+            steps[wrist, depth] = flipper_steps(
+                cycles, weakening, wrist=wrist, depth=depth
+            )
+        for sweep in sweeps:
+            by_depth[wrist, sweep] = [
+                flipper_steps(cycles, weakening, sweep=sweep, wrist=wrist, depth=depth)
+                for depth in depths
             ]
-        for radius in RADII:
-            weak[wrist, radius] = [
-                flipper_steps(one, radius, wrist=wrist) for one in WEAKENINGS
+        for radius in radii:
+            by_weakening[wrist, radius] = [
+                flipper_steps(cycles, one, radius, wrist=wrist) for one in weakenings
             ]
     speeds = {}
-    for strength in STRENGTHS:
+    for strength in strengths:
         for one in (0.0, LEG_WEAKENING):
             speeds[strength, one] = [
-                sandbot_speed(rate, strength, one) for rate in RATES
+                sandbot_speed(rate, strength, one) for rate in rates
             ]
-    return {"steps": steps, "depths": depths, "weak": weak, "speeds": speeds}
+    return {
+        "cycles": np.arange(1, cycles + 1),
+        "depths": np.array(depths),
+        "weakenings": np.array(weakenings),
+        "rates": np.array(rates),
+        "steps": steps,
+        "by depth": by_depth,
+        "by weakening": by_weakening,
+        "speeds": speeds,
+    }
 
 
 @plots.styled
-def draw(data: dict):
+def draw(numbers: dict):
+    """Draw the four panels."""
     fig, axes = plots.figure(8.4, 5.6, 2, 2)
-    cycles = np.arange(1, CYCLES + 1)
-    for (wrist, depth), lengths in data["steps"].items():
+    for (wrist, depth), lengths in numbers["steps"].items():
         look = line_look(wrist, SHOWN_DEPTHS.index(depth))
         label = f"{1e3 * depth:g} mm deep, {wrist}"
-        axes[0, 0].plot(cycles, 1e3 * lengths, **look, label=label)
+        axes[0, 0].plot(numbers["cycles"], 1e3 * lengths, **look, label=label)
     axes[0, 0].set(xlabel="cycle", ylabel="progress (mm)")
-    draw_last(
-        axes[0, 1], 1e3 * np.array(DEPTHS), data["depths"], SWEEPS, "{:g} degrees"
-    )
+    x = 1e3 * numbers["depths"]
+    draw_last(axes[0, 1], x, numbers["by depth"], SWEEPS, "{:g} degrees")
     axes[0, 1].set(xlabel="depth (mm)", ylabel="progress in the end (mm)")
-    draw_last(axes[1, 0], WEAKENINGS, data["weak"], RADII, "radius x {:g}")
+    x = numbers["weakenings"]
+    draw_last(axes[1, 0], x, numbers["by weakening"], RADII, "radius x {:g}")
     axes[1, 0].set(xlabel="weakening", ylabel="progress in the end (mm)")
-    for (strength, weakening), speeds in data["speeds"].items():
+    for (strength, weakening), speeds in numbers["speeds"].items():
         colour = style.SEQUENCE[STRENGTHS.index(strength)]
         dashes = "--" if weakening else "-"
         label = f"ground x {strength:g}, weakening {weakening:g}"
-        axes[1, 1].semilogy(
-            RATES, 100 * np.array(speeds), dashes, color=colour, label=label
-        )
+        y = 100 * np.array(speeds)
+        axes[1, 1].semilogy(numbers["rates"], y, dashes, color=colour, label=label)
     axes[1, 1].set(xlabel="rate of SandBot's legs (rad/s)", ylabel="speed (cm/s)")
     for ax in axes.ravel():
         style.draw_legend_right(ax)
@@ -136,20 +161,20 @@ def line_look(wrist: str, k: int) -> dict:
     return {"color": style.SEQUENCE[k], "ls": DASHES[wrist], "lw": 1.0}
 
 
-def table(data: dict) -> str:
+def table(numbers: dict) -> str:
     """Return the numbers as lines: progress in mm in the first cycles and the last, and
     speeds in cm/s."""
     lines = []
-    for (wrist, sweep), runs in data["depths"].items():
-        for depth, run in zip(DEPTHS, runs):
-            numbers = ", ".join(f"{1e3 * x:.1f}" for x in (*run[:3], run[-1]))
-            lines.append(f"{wrist}, {sweep} degrees, {1e3 * depth:g} mm: {numbers}")
-    for (wrist, radius), runs in data["weak"].items():
-        last = ", ".join(f"{1e3 * run[-3:].mean():.1f}" for run in runs)
-        lines.append(f"{wrist}, radius x {radius:g}, weakenings: {last}")
-    for (strength, weakening), speeds in data["speeds"].items():
-        numbers = ", ".join(f"{100 * x:.1f}" for x in speeds)
-        lines.append(f"SandBot, ground x {strength:g}, {weakening:g}: {numbers}")
+    for (wrist, sweep), runs in numbers["by depth"].items():
+        for depth, run in zip(numbers["depths"], runs):
+            shown = ", ".join(f"{1e3 * x:.1f}" for x in (*run[:3], run[-1]))
+            lines.append(f"{wrist}, {sweep} degrees, {1e3 * depth:g} mm: {shown}")
+    for (wrist, radius), runs in numbers["by weakening"].items():
+        shown = ", ".join(f"{1e3 * run[-3:].mean():.1f}" for run in runs)
+        lines.append(f"{wrist}, radius x {radius:g}, weakenings: {shown}")
+    for (strength, weakening), speeds in numbers["speeds"].items():
+        shown = ", ".join(f"{100 * x:.1f}" for x in speeds)
+        lines.append(f"SandBot, ground x {strength:g}, {weakening:g}: {shown}")
     return "\n".join(lines)
 
 

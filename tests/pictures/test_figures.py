@@ -110,6 +110,16 @@ COARSE = {
     "accuracy.kinks": {"grid": 21, "directions": 24},
     "swimmers.optimal_gaits": {"harmonics": 1, "starts": 1, "grid": 7, "phases": 16},
     "robots.sand_gaits": {"generations": 1, "walks": 4, "seconds": 0.3},
+    "robots.flipper_steps": {
+        "cycles": 1,
+        "shown": (0.02,),
+        "depths": (0.02,),
+        "sweeps": (80,),
+        "weakenings": (0.5,),
+        "radii": (1.0,),
+        "rates": (8.0,),
+        "strengths": (1.0,),
+    },
     "robots.walking_mujoco": {
         "study": {"steps": (8, 10)},
         "finest": {"steps": 12},
