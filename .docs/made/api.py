@@ -39,6 +39,7 @@ PACKAGES = {
         "rft.laws",
         "rft.bodies",
         "rft.effects",
+        "rft.hydrodynamics",
         "rft.laws.drag",
         "rft.fits.rods",
     ],

@@ -3,6 +3,8 @@ length over diameter.
 
     along   2 pi mu L / (ln p + g_t),  g_t = -0.207 + 0.980 / p - 0.133 / p^2
     across  4 pi mu L / (ln p + g_n),  g_n =  0.839 + 0.185 / p + 0.233 / p^2
+    about the centre, across the axis
+            pi mu L^3 / 3 (ln p + g_w),  g_w = -0.662 + 0.917 / p - 0.050 / p^2
 
 Source: M. M. Tirado, C. Lopez Martinez and J. Garcia de la Torre, J. Chem. Phys. 81,
 2047 (1984), for 2 <= p <= 30. As p grows, g_t and g_n tend to the limits -0.20 and 0.84
@@ -14,9 +16,10 @@ from __future__ import annotations
 
 import numpy as np
 
-# Constants of g along and across: of order 1, 1 / p and 1 / p^2.
+# Constants of g along, across and about the centre: of order 1, 1 / p and 1 / p^2.
 ALONG = (-0.207, 0.980, -0.133)
 ACROSS = (0.839, 0.185, 0.233)
+ABOUT = (-0.662, 0.917, -0.050)
 SHORTEST = 2.0  # slenderness from which the constants hold
 LONGEST_FITTED = 30.0  # slenderness up to which they were fitted
 
@@ -39,6 +42,12 @@ def normal_drag(p):
     return 0.5 / _logarithm(p, ACROSS)
 
 
+def rotational_drag(p):
+    """Return the torque on a cylinder that turns end over end at a unit rate, over the
+    cube of its length, in units of 8 pi mu."""
+    return 1 / 24 / _logarithm(p, ABOUT)
+
+
 def drag_ratio(p):
     """Return the drag across a cylinder over the drag along it; 2 in the limit of
     infinite length.
@@ -47,6 +56,6 @@ def drag_ratio(p):
     --------
     >>> from rft.formulas.cylinders import drag_ratio
     >>> [round(float(drag_ratio(p)), 3) for p in (5, 25, 1000)]
-    [1.252, 1.502, 1.73]
+    [1.277, 1.501, 1.73]
     """
     return normal_drag(p) / axial_drag(p)

@@ -74,9 +74,9 @@ class Beads:
     >>> from rft import Chain
     >>> from rft.hydrodynamics import Beads, resistance
     >>> resistance(Beads(48), Chain(), [[0.5, 0.3]]).connection.round(4)
-    array([[[-0.0135,  0.0012],
-            [-0.0543, -0.0538],
-            [ 0.2448, -0.2543]]])
+    array([[[-0.0026, -0.0005],
+            [-0.0097, -0.0085],
+            [-0.0711,  0.0623]]])
     """
 
     slenderness: Annotated[

@@ -63,9 +63,9 @@ class Stokeslets:
     >>> from rft import Chain
     >>> from rft.hydrodynamics import Stokeslets, resistance
     >>> resistance(Stokeslets(48, 24), Chain(), [[0.5, 0.3]]).connection.round(4)
-    array([[[-0.0138,  0.0013],
-            [-0.0543, -0.0538],
-            [ 0.2454, -0.2547]]])
+    array([[[-0.0028, -0.0005],
+            [-0.0104, -0.0091],
+            [-0.0702,  0.0614]]])
     """
 
     slenderness: Annotated[

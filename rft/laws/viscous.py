@@ -79,8 +79,4 @@ class Viscous(TermLaw):
 
     @classmethod
     def examples(cls) -> dict[str, Viscous]:
-        return {
-            "viscous-1": cls(1.0),
-            "viscous-slippery": cls(1e4),
-            "viscous-cylinder": cls(slenderness=50.0),
-        }
+        return {"viscous-1": cls(1.0), "viscous-slippery": cls(1e4)}

@@ -152,6 +152,7 @@ RIGHT = {  # what looks wrong and is not
     ("covariance", "None"),
     ("Granular", "covariance", "array"),
     ("Viscous", "covariance", "deep"),
+    ("Viscous", "slenderness", "None"),
     *(
         (type(gait).__name__, "frequency", "None")
         for gait in (*GAITS.values(), Sine(elements=8))

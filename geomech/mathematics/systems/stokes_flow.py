@@ -244,7 +244,7 @@ class BeadSwimmer(StokesFlow):
     --------
     >>> from geomech.mathematics.systems import BeadSwimmer
     >>> BeadSwimmer(slenderness=48).velocity([0.5, 0.3], [1.0, 0.0]).round(4)
-    array([-0.0018, -0.0035, -0.0829])
+    array([-0.0026, -0.0097, -0.0711])
     """
 
     slenderness: Annotated[
@@ -301,7 +301,7 @@ class StokesletSwimmer(StokesFlow):
     --------
     >>> from geomech.mathematics.systems import StokesletSwimmer
     >>> StokesletSwimmer(slenderness=48).velocity([0.5, 0.3], [1.0, 0.0]).round(4)
-    array([-0.0018, -0.0035, -0.0829])
+    array([-0.0028, -0.0104, -0.0702])
     """
 
     segments: Annotated[

@@ -50,13 +50,13 @@ def diagnosed_velocity(system: System, alpha, alphadot) -> dict:
     singular = Refusal(
         "the shape is singular", because=traits.singular, instead="move a joint"
     )
-    has_singular = traits.singularity is not None
-    if has_singular and not traits.singularity(alpha):
+    if traits.singularity is not None and not traits.singularity(alpha):
         raise singular
     diagnosed = capability(system, Diagnosed)
     if diagnosed is not None:
         return diagnosed.diagnosed(alpha, alphadot)
-    xi = evaluate(system.velocity, alpha, alphadot, masked=has_singular)
+    masked = traits.singularity is not None
+    xi = evaluate(system.velocity, alpha, alphadot, masked=masked)
     if np.isnan(xi).any():
         raise singular
     return {"xi": xi.tolist(), "status": "exact", "residual": 0.0}
