@@ -820,7 +820,7 @@ REFUSED = [
     ({"level": math.nan}, "level -1e+06 1e+06 m nan | value"),
     ({"level": "ball"}, "'ball' sphere | instead"),
     ({"level": "nothing"}, "'nothing' | instead"),
-    ({"slope": 1.2}, "68.8 degrees 37.9"),
+    ({"slope": 1.2}, "68.8 degrees 37.9 | because"),
     ({"rounding": 0.0}, "rounding 1e-07 10 m/s 0.0 | value"),
     ({"hulls": "no"}, "hulls True False 'no' | value"),
     ({"regions": ["x > 1"]}, "regions 'x > 1' | value instead"),

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from geomech.core.summary import effect_lines, part
-from geomech.scenes.terradynamics import walker
 from rft.core.refusal import in_line
 from rft.terradynamics.ground import GROUND_EFFECTS
 
@@ -19,13 +18,16 @@ def scene_lines(scene: Intruding | WalkerScene) -> list[str]:
     on the medium; and on the effects that are on and off."""
     name = in_line(scene.name)
     if hasattr(scene, "robot"):
+        # Only here: the mechanics of robots takes long to load.
+        from geomech.scenes.terradynamics.walker import KINDS
+
         lines = [
             f"{name}: {named_part(scene.robot)}",
             f"gait: {named_part(scene.gait)}",
             f"medium: {named_part(scene.medium)}",
             f"engine: {scene.engine}",
         ]
-        possible = sorted(walker.KINDS)
+        possible = sorted(KINDS)
     else:
         body = f"{named_part(scene.intruder)} of {scene.count:,} {scene.parts}"
         lines = [

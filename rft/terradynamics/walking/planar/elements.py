@@ -223,12 +223,15 @@ class Elements:
         sine = ground.grazing_sine
         if np.ndim(sine):
             sine = sine[robot]
+        loss = ground.downhill_loss
+        if np.ndim(loss):
+            loss = loss[robot]
         element_ground = Ground(
             ground.strength[robot],
             ground.flux[robot],
             ground.rounding[robot],
             self.closed[part] * sine,
-            ground.downhill_loss[robot],
+            loss,
             ground.disturbed,
         )
         forces = load(self.law, element_ground, e, g, side, bool(side.any()), True)
