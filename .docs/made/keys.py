@@ -14,6 +14,7 @@ CONTENTS = {
     "frame": "the body frame of all velocities and displacements; the one key above all sections",
     "medium": "the force law of sand or fluid with its numbers; for intruders and robots, a stress map or a law in three dimensions",
     "body": "the links, modes or elements of the body",
+    "contact": "which part of the body touches the ground when, and who bears it",
     "effects": "additions to the force law, such as end caps, mass or a slope",
     "system": "a system that replaces medium and body, such as a snake on wheels or a connection from a file",
     "gait": "the closed curve of shapes that the body repeats, or the clock of a robot's legs",
