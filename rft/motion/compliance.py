@@ -31,11 +31,11 @@ from rft.balance.compliant import (
 )
 from rft.balance.listening import listener
 from rft.balance.solver import begin, limits_of, problem_limits
-from rft.bodies.base import joint_angles, joint_speed
+from rft.bodies.base import joint_speed
 from rft.core.refusal import require
 from rft.effects.base import Effect, Site
 from rft.effects.contact import Assembly, Problem, take
-from rft.effects.springs import JointSprings, Springs
+from rft.effects.springs import JointSprings, Springs, joint_rows
 from rft.formulas.newton import Limits
 from rft.formulas.springs import extrapolated_rate, held_shape, mixing_weight
 from rft.laws.batch import MediumBatch
@@ -103,7 +103,7 @@ class CompliantStepping(Stepping):
     def _check_steps(self) -> None:
         """Raise ValueError if a command turns a joint by more than half a turn from
         one phase to the next, which no step resolves."""
-        angles = np.stack([joint_angles(self.assembly.body, x) for x in self.alpha])
+        angles = joint_rows(self.assembly.body) @ self.alpha
         largest = np.abs(angles - np.roll(angles, 1, axis=0)).max(initial=0.0)
         require(
             largest <= np.pi,

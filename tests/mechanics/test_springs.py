@@ -363,3 +363,14 @@ def test_springs_that_make_no_sense_are_refused(options, body, medium, named):
         time_steps(
             medium, body, *np.zeros((2, 8, body.joints)), effects=[Springs(**options)]
         )
+
+
+def test_commands_that_no_step_resolves_are_refused():
+    """By the angles of joints: modes of a body with many have large amplitudes."""
+    worm = Serpenoid(40)
+    springs = Springs(bending=0.02, frequency=0.5)
+    command = circle(6.0, 16)
+    time_steps(Viscous(40.0), worm, *command, effects=[springs], cycles=1)
+    stiff = Springs(1.0, frequency=0.5)
+    with pytest.raises(Refusal, match="phases"):
+        time_steps(Viscous(), Chain(), *circle(20.0, 16), effects=[stiff])
