@@ -69,7 +69,7 @@ class WalkerScene:
         ),
     ]
     gait: Annotated[Tripod, Keys(Tripod, owner=OWNER)]
-    effects: Annotated[tuple[GroundEffect, ...], Each(KINDS)] = ()
+    effects: Annotated[tuple[GroundEffect, ...], Each(KINDS, owner=OWNER)] = ()
     numerics: Annotated[Fineness, Keys(Fineness, owner=OWNER)] = field(
         default_factory=Fineness
     )
