@@ -99,12 +99,10 @@ class ContactRule:
                 known,
                 f"{name} must be one of {', '.join(choices)}",
                 value=value,
-                where="contact",
             )
         require(
             self.width is None or self.bearing == "balanced",
             "a width applies only to bearing = 'balanced'",
-            where="contact",
             instead="remove the width, or balance the loads",
         )
 
@@ -124,7 +122,6 @@ class ContactRule:
             self.follows == "phase" or body.joints >= 2,
             "contact that follows the shape needs two shape variables",
             value=body.joints,
-            where="contact",
             instead="use follows = 'phase'",
         )
 
@@ -150,7 +147,6 @@ class ContactRule:
             weights.shape == shape,
             f"weights of contact must have shape {shape} here",
             value=weights.shape,
-            where="contact",
         )
         in_bounds = bool(((weights >= 0.0) & (weights <= 1.0)).all())
         if not in_bounds:
@@ -158,7 +154,6 @@ class ContactRule:
             raise Refusal(
                 "weights of contact must lie from 0 to 1",
                 value=float(outside[0]),
-                where="contact",
             )
         return weights
 
@@ -169,9 +164,8 @@ class ContactRule:
         first = float(np.broadcast_to(phase, touching.shape)[touching.argmin()])
         raise Refusal(
             f"nothing touches the ground at a contact phase of {first:.3g} rad",
-            where="contact",
             because="no part would bear the body",
-            instead="raise the duty, or the number of waves",
+            instead="let parts touch for longer, or at other phases",
         )
 
     def factors(

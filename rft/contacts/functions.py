@@ -40,7 +40,6 @@ class FunctionContact(ContactRule):
             callable(self.function),
             "function must be a function of places and phases",
             value=self.function,
-            where="contact",
         )
         try:
             self._check_weights()
@@ -50,7 +49,6 @@ class FunctionContact(ContactRule):
             raise Refusal(
                 "function fails",
                 because=f"{type(error).__name__}: {error}",
-                where="contact",
             ) from error
 
     def weights(self, station: np.ndarray, phase: np.ndarray) -> np.ndarray:

@@ -46,13 +46,11 @@ class LinkContact(ContactRule):
             isinstance(self.links, (tuple, list)),
             "links must be a list with an entry for each link",
             value=self.links,
-            where="contact",
         )
         object.__setattr__(self, "links", tuple(map(self._checked, self.links)))
         require(
             len(self.links) > 0,
             "links must have an entry for each link",
-            where="contact",
         )
         self._check_weights()
 
@@ -65,7 +63,6 @@ class LinkContact(ContactRule):
             phases.size == 0 or (is_pair and in_bounds),
             "each entry of links must be [touches down, lifts off], from 0 to 1, or []",
             value=link,
-            where="contact",
         )
         on = tuple(phases.tolist())
         if on and self._length(on) < 1:
@@ -74,7 +71,6 @@ class LinkContact(ContactRule):
                 raise Refusal(
                     f"a rise of {self.rise:.3g} rad does not fit a link that touches "
                     f"from {on[0]:g} to {on[1]:g}",
-                    where="contact",
                     instead=f"lower rise to {room:.3g} rad or less",
                 )
         return on
@@ -93,7 +89,6 @@ class LinkContact(ContactRule):
         require(
             links == len(self.links),
             f"links has {len(self.links)} entries, and the body has {links} links",
-            where="contact",
             instead="give [touches down, lifts off] for each link, tail to head",
         )
 

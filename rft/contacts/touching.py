@@ -60,7 +60,6 @@ class Touching:
         require(
             not hasattr(self.inner, "contact_factors"),
             "this body has a contact of its own",
-            where="contact",
             instead="remove the rule of contact",
         )
         self.contact.check(self.inner)

@@ -58,7 +58,6 @@ class WaveContact(ContactRule):
         require(
             fits,
             f"a rise of {self.rise:.3g} rad does not fit a duty of {self.duty:.3g}",
-            where="contact",
             because=f"a part has {room:.3g} rad to touch or to be lifted in",
             instead=f"lower rise to {room:.3g} rad or less, or use a duty of 1",
         )

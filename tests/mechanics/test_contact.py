@@ -309,7 +309,7 @@ def test_the_steeper_the_slope_the_more_of_a_sidewinder_must_touch():
 
 REFUSED = {
     "duty without room": (lambda: WaveContact(duty=0.95), "rise", "duty"),
-    "nothing touches": (lambda: WaveContact(waves=0.1, duty=0.3), "touches", "duty"),
+    "nothing touches": (lambda: WaveContact(waves=0.1, duty=0.3), "touches", "phase"),
     "no foot on the ground": (
         lambda: LinkContact(links=((0.0, 0.4), (), (0.5, 0.9))),
         "touches",

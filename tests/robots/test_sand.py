@@ -948,7 +948,8 @@ def test_what_changes_after_attach_is_refused():
 )
 def test_what_is_not_installed_is_named(missing, module, name, message, monkeypatch):
     package = importlib.import_module(module)
-    monkeypatch.delitem(sys.modules, f"{module}.{name}", raising=False)
+    for loaded in [x for x in sys.modules if x.startswith(f"{module}.")]:
+        monkeypatch.delitem(sys.modules, loaded)
     monkeypatch.delattr(package, name, raising=False)
     monkeypatch.setitem(sys.modules, missing, None)
     with pytest.raises(rft.Refusal, match=message):
