@@ -297,7 +297,7 @@ def _cycles(
     if springs is not None and cycles is None:
         status = _with_periods(status, state.cycles.displacements)
     status = np.where(worst <= limit, status, "unconverged")
-    if stepping.reads_place:
+    if stepping.is_pulled:
         slid = [
             (row.residual > row.limit) & runs_away(row.xi, scale)
             for row, scale in zip(rows, stepping.scales)

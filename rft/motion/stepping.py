@@ -29,6 +29,7 @@ from rft.bodies.base import Elements, joint_speed
 from rft.core.premise import Premise
 from rft.effects.base import PAST, Effect, Site, broken_premises, stepwise_effects
 from rft.effects.contact import Assembly, Problem
+from rft.effects.slope import Slope
 from rft.formulas.link import TINY
 from rft.formulas.newton import to_element
 from rft.motion import limit_cycle
@@ -112,6 +113,8 @@ class Stepping:
         # Memory and mass have no effect at the first step.
         self.first_effects = [not effect.breaks & PAST for effect in self.effects]
         self.reads_place = any(effect.reads_place for effect in self.effects)
+        # Only a weight along the ground moves a body that no drag can hold.
+        self.is_pulled = any(isinstance(effect, Slope) for effect in self.effects)
         self.compiled_updates = [
             updates_compiled(backend, effect, assembly.law) for effect in self.effects
         ]
@@ -229,6 +232,8 @@ class Stepping:
     def _is_lost(self, s: State) -> np.ndarray:
         """Return whether samples (B,) had no balance at the last step and slid away: no
         time is spent on further steps of theirs."""
+        if not self.is_pulled:
+            return np.zeros(s.xi.shape[1], bool)
         k = (int(s.count[0, 0]) - 1) % self.phases
         return runs_away(s.xi, self.scales[k])
 
